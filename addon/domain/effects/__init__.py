@@ -1,0 +1,16 @@
+"""The effects, each declared in its module and listed here once, in the order in which they act."""
+
+from . import anatomy, mottle, oil, oxygenation, perfusion, relief, scattering
+from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scene, ShaderInput
+
+EFFECTS: tuple[Effect, ...] = (
+    scattering.EFFECT,
+    anatomy.EFFECT,
+    mottle.EFFECT,
+    perfusion.EFFECT,
+    oxygenation.EFFECT,
+    relief.EFFECT,
+    oil.EFFECT,
+)
+
+__all__ = ["EFFECTS", "ELSEWHERE", "Activation", "Bounds", "Effect", "Fragment", "Frame", "Scene", "ShaderInput"]

@@ -1,0 +1,43 @@
+"""Anatomy: cheeks, nose, ears and lips carry more vessels; pigment and oil differ by region."""
+
+from ..blood import ANATOMY
+from .effect import Bounds, Effect, Fragment, Scene, ShaderInput, scale_bounds, shift_bounds, strength_activation
+
+MAP = "anatomy"
+"""Image: hemoglobin, melanin and oil factors (1 = as the skin's own value) and, in alpha, the oxygenation shift."""
+
+
+def _bounds(scene: Scene, bounds: Bounds) -> Bounds:
+    strength = scene.strengths["anatomy"]
+    present = {region: row for region, row in ANATOMY.items() if region in scene.regions}
+    for chromophore in ("hemoglobin", "melanin"):
+        factors = {r: 1.0 + strength * (getattr(row, chromophore) - 1.0) for r, row in present.items()}
+        bounds = scale_bounds(bounds, chromophore, {r: (f, f) for r, f in factors.items()})
+    shifts = {r: strength * row.oxygenation for r, row in present.items()}
+    return shift_bounds(bounds, "oxygenation", {r: (s, s) for r, s in shifts.items()})
+
+
+def _fragment(_scene: Scene) -> Fragment:
+    return Fragment(
+        stage="chromophores",
+        file="anatomy.osl",
+        inputs=(
+            ShaderInput("anatomy_factors", "color", "map", MAP, default=1.0),
+            ShaderInput("anatomy_shift", "float", "map:alpha", MAP),
+            ShaderInput("anatomy", "float", "strength", "anatomy"),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="anatomy",
+    label="Anatomy",
+    help="Regional vascular density, pigment and oil of a face: cheeks, nose, ears, lips and the rest.",
+    reads=("hemoglobin", "melanin", "oxygenation", "oil"),
+    writes=("hemoglobin", "melanin", "oxygenation", "oil"),
+    activate=lambda scene: strength_activation(scene, "anatomy", needs_regions=True),
+    fragment=_fragment,
+    bounds=_bounds,
+    maps=lambda scene: (MAP,),
+    default_strength=1.0,
+)

@@ -1,0 +1,135 @@
+"""What an effect declares, and the view of a scene by which the planner decides.
+
+An effect is one module of this package that holds one `EFFECT`, listed once in `effects/__init__.py`.
+The planner asks it whether the scene calls for it and what range each chromophore then takes; the shader
+is assembled from the fragments of the active effects, and only their maps and inputs are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ..parameters import PARAMETERS, Skin
+
+Interval = tuple[float, float]
+Bounds = Mapping[str, Mapping[str, Interval]]
+"""chromophore id -> region id -> the lowest and highest value it takes there."""
+
+ELSEWHERE = "elsewhere"
+"""The skin that no region mask covers."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One moment of a shot: which emotions are on, each 0-1, and how strongly blood answers."""
+
+    id: str
+    emotions: Mapping[str, float] = field(default_factory=dict)
+    blood: float = 1.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that the planner may look at."""
+
+    skin: Skin
+    frames: tuple[Frame, ...]
+    # Effects an artist switches by strength rather than by a skin parameter: effect id -> 0-1.
+    strengths: Mapping[str, float] = field(default_factory=dict)
+    # Regions whose masks the face has. A face without masks has none.
+    regions: tuple[str, ...] = ()
+    # True while an artist works: every control may still move, so axes span what sliders reach.
+    live: bool = False
+
+
+@dataclass(frozen=True)
+class Activation:
+    """Whether an effect runs, why, and in which frames (their ids)."""
+
+    active: bool
+    because: str
+    frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ShaderInput:
+    """One input of the assembled shader and where its value comes from.
+
+    source: "parameter" (a schema id, a slider of the node group), "strength" (the effect's own slider),
+    "object" (a custom property of the object), "vertex" (an attribute of the mesh), "map" (a packed image,
+    "map:alpha" its alpha channel).
+    """
+
+    name: str
+    type: str  # OSL type: "float", "color" or "vector"
+    source: str
+    key: str
+    default: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fragment:
+    """OSL of one effect: a file of `shaders_osl/effects/`, its inputs, and macros the file uses."""
+
+    stage: str  # "chromophores" or "surface"
+    file: str
+    inputs: tuple[ShaderInput, ...] = ()
+    defines: Mapping[str, str] = field(default_factory=dict)
+
+
+def _unchanged(_scene: Scene, bounds: Bounds) -> Bounds:
+    return bounds
+
+
+def _no_maps(_scene: Scene) -> tuple[str, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect, declared once."""
+
+    id: str
+    label: str
+    help: str
+    reads: tuple[str, ...]  # chromophores or parameters it needs
+    writes: tuple[str, ...]  # chromophores it changes
+    activate: Callable[[Scene], Activation]
+    fragment: Callable[[Scene], Fragment | None]
+    bounds: Callable[[Scene, Bounds], Bounds] = _unchanged
+    maps: Callable[[Scene], tuple[str, ...]] = _no_maps
+    # An effect with a slider of its own has a default strength (0 = off unless asked for).
+    default_strength: float | None = None
+
+
+def strength_activation(scene: Scene, effect_id: str, needs_regions: bool = False) -> Activation:
+    """The rule of effects that run when their own strength is above 0."""
+    strength = scene.strengths.get(effect_id, 0.0)
+    if strength <= 0.0:
+        return Activation(False, f"its strength is {strength:g}")
+    if needs_regions and not scene.regions:
+        return Activation(False, "the face has no region masks")
+    return Activation(True, f"its strength is {strength:g}", tuple(frame.id for frame in scene.frames))
+
+
+def scale_bounds(bounds: Bounds, chromophore: str, factors: Mapping[str, Interval]) -> Bounds:
+    """`bounds` with one chromophore multiplied by a range of factors per region (1 where not named)."""
+    return _mapped(bounds, chromophore, factors, (1.0, 1.0), lambda v, f: (v[0] * f[0], v[1] * f[1]))
+
+
+def shift_bounds(bounds: Bounds, chromophore: str, changes: Mapping[str, Interval]) -> Bounds:
+    """`bounds` with a range of changes per region added to one chromophore (0 where not named)."""
+    return _mapped(bounds, chromophore, changes, (0.0, 0.0), lambda v, c: (v[0] + c[0], v[1] + c[1]))
+
+
+def _mapped(bounds, chromophore, by_region, neutral, combine) -> Bounds:
+    row = PARAMETERS[chromophore]
+
+    def inside(interval: Interval) -> Interval:
+        low, high = (min(max(v, row.hard_min), row.hard_max) for v in interval)
+        return low, high
+
+    regions = bounds[chromophore]
+    changed = {name: inside(combine(value, by_region.get(name, neutral))) for name, value in regions.items()}
+    return {**bounds, chromophore: changed}

@@ -1,0 +1,29 @@
+"""The oil film: a Torrance-Sparrow reflection above the skin; what it reflects does not enter."""
+
+from .effect import Activation, Effect, Fragment, Scene, ShaderInput
+
+
+def _activate(scene: Scene) -> Activation:
+    oil = scene.skin["oil"]
+    if oil <= 0.0 and not scene.live:
+        return Activation(False, "oil is 0")
+    return Activation(True, f"oil is {oil:g}", tuple(frame.id for frame in scene.frames))
+
+
+def _fragment(_scene: Scene) -> Fragment:
+    return Fragment(
+        stage="surface",
+        file="oil.osl",
+        inputs=(ShaderInput("roughness", "float", "parameter", "roughness"),),
+    )
+
+
+EFFECT = Effect(
+    id="oil",
+    label="Oil film",
+    help="Highlights of the oil film on the skin. The light it reflects is taken from what enters.",
+    reads=("oil", "roughness"),
+    writes=(),
+    activate=_activate,
+    fragment=_fragment,
+)

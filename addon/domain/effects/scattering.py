@@ -1,0 +1,18 @@
+"""Light under the skin: Burley lobes whose weights and radii come from the chromophores. Always on."""
+
+from .effect import Activation, Effect, Scene
+
+
+def _activate(scene: Scene) -> Activation:
+    return Activation(True, "skin is seen", tuple(frame.id for frame in scene.frames))
+
+
+EFFECT = Effect(
+    id="scattering",
+    label="Scattering",
+    help="Light that enters the skin, scatters in both layers and leaves at a distance.",
+    reads=("melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm"),
+    writes=(),
+    activate=_activate,
+    fragment=lambda scene: None,  # it is the fixed code of both shaders
+)

@@ -1,0 +1,68 @@
+"""The table of scattering: Burley lobes over the chromophores that vary, as one image.
+
+Layout, from the first row up: for each quantity (weight 0..3, then d_mm 0..3) one block; a block holds one tile
+per entry of axis 2; a tile has one row per entry of axis 1 and one column per entry of axis 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import sanguine_core
+
+from .parameters import PARAMETERS, Skin, skin_rows
+from .plan import Axis
+
+LOBES = 4
+QUANTITIES = 2 * LOBES
+
+
+@dataclass(frozen=True)
+class Table:
+    """Lobes of every entry.
+
+    image: (height, columns, 3) float32, row 0 lowest (as Blender stores images). weights are fractions of the
+    incident light, d in mm. clamped, fit_error: the worst entry's share per channel.
+    """
+
+    axes: tuple[Axis, ...]
+    image: np.ndarray
+    clamped: np.ndarray
+    fit_error: np.ndarray
+
+    def quantity_offset(self, quantity: int) -> float:
+        """How far up the image (0-1) the block of `quantity` begins."""
+        return quantity / QUANTITIES
+
+
+def table_height(axes: tuple[Axis, ...]) -> int:
+    return QUANTITIES * math.prod(axis.count for axis in axes[1:])
+
+
+def entry_skins(axes: tuple[Axis, ...], skin: Skin) -> np.ndarray:
+    """(N, P) parameters of every entry, axis 0 fastest."""
+    rows = np.repeat(skin_rows([skin]), math.prod(axis.count for axis in axes), axis=0)
+    grids = np.meshgrid(*(axis.values() for axis in reversed(axes)), indexing="ij")
+    columns = list(PARAMETERS)
+    for axis, grid in zip(reversed(axes), grids, strict=True):
+        rows[:, columns.index(axis.id)] = grid.ravel()
+    return rows
+
+
+def bake(
+    axes: tuple[Axis, ...],
+    skin: Skin,
+    working_space: str | np.ndarray,
+    progress: Callable[[int, int], bool] | None = None,
+) -> Table:
+    """Solves every entry. `working_space`: a name that `sanguine_core` knows or a 3x3 XYZ (D65) to RGB matrix."""
+    fit = sanguine_core.burley_lobes(
+        entry_skins(axes, skin), working_space, lobe_count=LOBES, threads=0, progress=progress
+    )
+    columns = axes[0].count if axes else 1
+    quantities = np.concatenate([fit["weights"], fit["d_mm"]], axis=1)  # (N, QUANTITIES, 3)
+    image = quantities.transpose(1, 0, 2).reshape(table_height(axes), columns, 3)
+    return Table(axes, np.ascontiguousarray(image, dtype=np.float32), fit["clamped"].max(0), fit["fit_error"].max(0))

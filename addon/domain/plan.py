@@ -1,0 +1,128 @@
+"""The planner: which effects a scene calls for, and the smallest table and shader that serve them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene
+from .errors import InputError, nearest
+from .parameters import PARAMETERS
+
+AXIS_CHROMOPHORES = ("hemoglobin", "melanin", "oxygenation")
+"""Chromophores that the table can vary over, fastest axis first."""
+
+# Colour goes with the logarithm of an absorber's concentration over most of its range, so these axes are
+# spaced by ratio; oxygenation mixes two absorbers linearly. Steps keep linear interpolation between entries
+# within Delta E 0.3 (tests/domain/test_lut.py measures it).
+_LOG_STEP = {"hemoglobin": 0.24, "melanin": 0.20}
+_LINEAR_STEP = {"oxygenation": 0.15}
+# A logarithm needs a floor: below these fractions an absorber no longer shows.
+_LOG_FLOOR = {"hemoglobin": 5e-4, "melanin": 5e-4}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the table: `count` values of a chromophore from `low` to `high`."""
+
+    id: str
+    low: float
+    high: float
+    count: int
+    logarithmic: bool
+
+    def values(self) -> list[float]:
+        if self.logarithmic:
+            ratio = math.log(self.high / self.low) / (self.count - 1)
+            return [self.low * math.exp(ratio * i) for i in range(self.count)]
+        return [self.low + (self.high - self.low) * i / (self.count - 1) for i in range(self.count)]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What will be simulated for a scene, and why."""
+
+    scene: Scene
+    decisions: Mapping[str, Activation]
+    axes: tuple[Axis, ...]
+    fragments: tuple[Fragment, ...]
+    maps: tuple[str, ...]
+
+    @property
+    def active(self) -> tuple[Effect, ...]:
+        return tuple(effect for effect in EFFECTS if self.decisions[effect.id].active)
+
+    @property
+    def entries(self) -> int:
+        """How many skins the table holds (1: a constant, no table)."""
+        return math.prod(axis.count for axis in self.axes)
+
+
+def make_plan(scene: Scene) -> Plan:
+    """Decides from the scene alone; does none of the work."""
+    decisions = {effect.id: effect.activate(scene) for effect in EFFECTS}
+    active = [effect for effect in EFFECTS if decisions[effect.id].active]
+    axes = _axes(scene, active)
+    fragments = [effect.fragment(scene) for effect in active]
+    return Plan(
+        scene=scene,
+        decisions=decisions,
+        axes=axes,
+        fragments=tuple(f for f in fragments if f is not None),
+        maps=tuple(dict.fromkeys(name for effect in active for name in effect.maps(scene))),
+    )
+
+
+def default_strengths() -> dict[str, float]:
+    return {effect.id: effect.default_strength for effect in EFFECTS if effect.default_strength is not None}
+
+
+def check_strengths(given: Mapping[str, float], where: str) -> dict[str, float]:
+    """Strengths with defaults filled in. Raises InputError for an effect that has none or a value beyond 0-1."""
+    strengths = default_strengths()
+    for key, value in given.items():
+        if key not in strengths:
+            raise InputError(f"{where}: {key}: no effect with a strength of its own, {nearest(key, strengths)}")
+        if not 0.0 <= value <= 1.0:
+            raise InputError(f"{where}: {key}: {value} is outside 0 to 1")
+        strengths[key] = float(value)
+    return strengths
+
+
+def _axes(scene: Scene, active: list[Effect]) -> tuple[Axis, ...]:
+    """The chromophores that differ between places or moments, with the range each one takes."""
+    regions = (*scene.regions, ELSEWHERE)
+    bounds: Bounds = {
+        name: {region: _slider_reach(scene, name) for region in regions} for name in AXIS_CHROMOPHORES
+    }
+    for effect in active:
+        bounds = effect.bounds(scene, bounds)
+    axes = []
+    for name in AXIS_CHROMOPHORES:
+        low = min(interval[0] for interval in bounds[name].values())
+        high = max(interval[1] for interval in bounds[name].values())
+        axis = _axis(name, low, high)
+        if axis:
+            axes.append(axis)
+    return tuple(axes)
+
+
+def _slider_reach(scene: Scene, name: str) -> tuple[float, float]:
+    """The skin's own value, or all that the artist's slider reaches while he works."""
+    if scene.live:
+        row = PARAMETERS[name]
+        value = scene.skin[name]
+        return min(row.soft_min, value), max(row.soft_max, value)
+    return scene.skin[name], scene.skin[name]
+
+
+def _axis(name: str, low: float, high: float) -> Axis | None:
+    if name in _LOG_STEP:
+        low, high = max(low, _LOG_FLOOR[name]), max(high, _LOG_FLOOR[name])
+        span, step = math.log(high / low), _LOG_STEP[name]
+    else:
+        span, step = high - low, _LINEAR_STEP[name]
+    if span < 1e-9:
+        return None
+    return Axis(name, low, high, max(2, math.ceil(span / step) + 1), name in _LOG_STEP)

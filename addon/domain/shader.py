@@ -1,0 +1,69 @@
+"""The two OSL shaders of a plan, assembled from `shaders_osl/` and the fragments of the active effects.
+
+The first (`chromophores.osl`) says what is in the skin at a point and where the table holds it; Image Texture
+nodes read the table; the second (`surface.osl`) turns what they read into closures. What the plan leaves out
+is not in the text: no input, no instruction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .effects import Fragment, ShaderInput
+from .lut import LOBES, table_height
+from .plan import Plan
+from .resources import shaders_path
+
+
+@dataclass(frozen=True)
+class Shader:
+    """OSL source of one script node and the inputs that effects added to it."""
+
+    source: str
+    inputs: tuple[ShaderInput, ...]
+
+
+def assemble(plan: Plan) -> tuple[Shader, Shader]:
+    """(chromophores, surface) for `plan`."""
+    active = {effect.id for effect in plan.active}
+    axes = plan.axes
+    defines = {
+        "AXES": len(axes),
+        "TABLE_HEIGHT": float(table_height(axes)),
+        "FILM": int("oil" in active),
+        "RELIEF": int("relief" in active),
+    }
+    for i, axis in enumerate(axes):
+        defines |= {
+            f"AXIS_{i}_VALUE": axis.id,
+            f"AXIS_{i}_LOW": axis.low,
+            f"AXIS_{i}_HIGH": axis.high,
+            f"AXIS_{i}_COUNT": float(axis.count),
+            f"AXIS_{i}_LOG": int(axis.logarithmic),
+        }
+    return (
+        _assemble("chromophores", plan.fragments, defines),
+        _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2)}),
+    )
+
+
+def _assemble(stage: str, fragments: tuple[Fragment, ...], defines: Mapping[str, object]) -> Shader:
+    mine = [fragment for fragment in fragments if fragment.stage == stage]
+    inputs = tuple({item.name: item for fragment in mine for item in fragment.inputs}.values())
+    for fragment in mine:
+        defines = {**defines, **fragment.defines}
+    head = "".join(f"#define {name} {value}\n" for name, value in defines.items())
+    text = shaders_path(f"{stage}.osl").read_text(encoding="utf-8")
+    text = text.replace("//@inputs\n", "".join(f"    {_declare(item)},\n" for item in inputs))
+    body = "\n".join(shaders_path(f"effects/{f.file}").read_text(encoding="utf-8") for f in mine)
+    return Shader(head + text.replace("//@fragments\n", body), inputs)
+
+
+def _declare(item: ShaderInput) -> str:
+    return f"{item.type} {item.name} = {float(item.default)}"
+
+
+def lobe_sockets(suffix: str = "") -> list[str]:
+    """Names of the surface shader's lobe inputs in the order of the table's quantities."""
+    return [f"{kind}_{k}{suffix}" for kind in ("weight", "d_mm") for k in range(LOBES)]
