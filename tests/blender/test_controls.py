@@ -1,0 +1,202 @@
+"""In Blender: the drivers compute what the domain computes, survive saving and linking, and leave no trace."""
+
+import subprocess
+import sys
+import textwrap
+
+import bpy
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sanguine.blender import controls
+from sanguine.domain.blood import BLOOD_CHANNELS, BLOOD_CONTROL_MAX, blood_change
+from sanguine.domain.errors import InputError
+from sanguine.domain.facs import ARKIT, EMOTION_CONTROLS, SHAPE_KEYS, shape_key_values
+from sanguine.domain.response import Response
+
+mixes = st.fixed_dictionaries(
+    {
+        name: st.floats(0.0, 1.0) if name in EMOTION_CONTROLS else st.sampled_from((0.0, 0.0, 0.0, 0.3, 1.0))
+        for name in controls.CONTROLS
+        if name != "blood"
+    }
+    | {"blood": st.floats(0.0, BLOOD_CONTROL_MAX)}
+)
+
+
+def add_mesh(name, keys):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    mesh_object = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(mesh_object)
+    for key in ("Basis", *keys):
+        mesh_object.shape_key_add(name=key).value = 0.0
+    return mesh_object
+
+
+def add_armature():
+    armature = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    bpy.context.collection.objects.link(armature)
+    return armature
+
+
+@pytest.fixture
+def face():
+    """An armature and a skin with all 52 keys, driven."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature, skin = add_armature(), add_mesh("skin", ARKIT.keys)
+    controls.add_controls(armature)
+    controls.drive_shape_keys(armature, [skin])
+    controls.drive_blood(armature, skin, BLOOD_CHANNELS.values())
+    return armature, skin
+
+
+def evaluated(skin):
+    """Shape key values and blood properties after evaluation."""
+    result = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    keys = {key.name: key.value for key in result.data.shape_keys.key_blocks}
+    return keys, {c.property_name: result[c.property_name] for c in BLOOD_CHANNELS.values()}
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(values=mixes)
+def test_drivers_equal_the_domain_for_any_mix(face, values):
+    armature, skin = face
+    controls.set_controls(armature, values)
+    keys, blood = evaluated(skin)
+    expected = shape_key_values(values)
+    assert {name: keys[name] for name in expected} == pytest.approx(expected, abs=1e-6)
+    emotions = {name: values[name] for name in EMOTION_CONTROLS}
+    for (region, quantity), channel in BLOOD_CHANNELS.items():
+        change = blood_change(emotions, region, values["blood"])[quantity == "oxygenation"]
+        assert blood[channel.property_name] == pytest.approx(change, abs=1e-6)
+
+
+def test_every_driver_is_a_short_simple_expression(face):
+    _, skin = face
+    curves = [*skin.animation_data.drivers, *skin.data.shape_keys.animation_data.drivers]
+    assert len(curves) == len(SHAPE_KEYS) + len(BLOOD_CHANNELS)
+    for curve in curves:
+        assert curve.driver.is_valid and curve.driver.is_simple_expression, curve.data_path
+        assert len(curve.driver.expression) < 255
+
+
+def test_a_driver_that_blender_would_cut_names_its_key(face):
+    armature, skin = face
+    too_long = Response(tuple((0.123456789, control) for control in list(controls.CONTROLS)[:20]))
+    with pytest.raises(ValueError, match="jawOpen.*split it"):
+        controls._drive(skin.data.shape_keys, 'key_blocks["jawOpen"].value', too_long, armature)
+
+
+def test_controls_have_range_tooltip_and_default_and_can_be_overridden(face):
+    bone = face[0].pose.bones[controls.CONTROL_BONE]
+    assert set(bone.keys()) >= set(controls.CONTROLS)
+    for name, control in controls.CONTROLS.items():
+        ui = bone.id_properties_ui(name).as_dict()
+        assert (ui["min"], ui["max"], ui["soft_max"]) == (0.0, control.maximum, control.maximum)
+        assert ui["default"] == bone[name] == control.default == (1.0 if name == "blood" else 0.0)
+        assert len(ui["description"]) > 5
+        assert bone.is_property_overridable_library(f'["{name}"]')
+
+
+def test_blood_properties_hold_their_whole_range(face):
+    _, skin = face
+    for channel in BLOOD_CHANNELS.values():
+        ui = skin.id_properties_ui(channel.property_name).as_dict()
+        assert (ui["min"], ui["max"]) == pytest.approx((2.0 * channel.response.low, 2.0 * channel.response.high))
+
+
+def test_missing_and_occupied_keys_are_reported_and_left_alone():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature, skin, teeth = add_armature(), add_mesh("skin", ["jawOpen", "browInnerUp"]), add_mesh("teeth", ["jawOpen"])
+    controls.add_controls(armature)
+    skin.data.shape_keys.key_blocks["browInnerUp"].driver_add("value").driver.expression = "0.25"
+    report = controls.drive_shape_keys(armature, [skin, teeth, armature])
+    assert report.driven == ("jawOpen",)
+    assert set(report.missing) == set(SHAPE_KEYS) - {"jawOpen"}
+    assert report.occupied == ("skin: browInnerUp",)
+    assert controls.drive_shape_keys(armature, [skin, teeth, armature]) == report
+    assert skin.data.shape_keys.animation_data.drivers.find('key_blocks["browInnerUp"].value').driver.expression == "0.25"
+
+
+def test_removal_leaves_no_trace(face):
+    armature, skin = face
+    controls.set_controls(armature, {"anger": 1.0})
+    evaluated(skin)
+    controls.remove_shape_key_drivers(armature, [skin, armature])
+    controls.remove_blood(armature, skin)
+    controls.remove_controls(armature)
+    assert skin.animation_data is None and skin.data.shape_keys.animation_data is None
+    assert not skin.keys() and not armature.keys() and not armature.data.bones
+    assert all(key.value == 0.0 for key in skin.data.shape_keys.key_blocks)
+    controls.remove_controls(armature)
+
+
+def test_a_hidden_armature_is_refused_with_what_to_do():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature = add_armature()
+    armature.hide_viewport = True
+    with pytest.raises(InputError, match="rig: hidden .* show it first"):
+        controls.add_controls(armature)
+
+
+def test_adding_twice_keeps_what_was_set(face):
+    armature, _ = face
+    controls.set_controls(armature, {"fear": 0.5})
+    assert controls.add_controls(armature)["fear"] == 0.5
+
+
+@pytest.mark.parametrize(("name", "value", "message"), [("angre", 1.0, "did you mean 'anger'"), ("AU4", 1.5, "outside 0 to 1")])
+def test_a_wrong_control_is_refused(face, name, value, message):
+    with pytest.raises(InputError, match=message):
+        controls.set_controls(face[0], {name: value})
+
+
+KEYED_ELSEWHERE = """
+    import sys
+    import bpy
+
+    class Refuse:
+        def find_spec(self, name, path=None, target=None):
+            assert not name.startswith("sanguine"), name
+
+    sys.meta_path.insert(0, Refuse())
+    {open}
+    armature, skin = (next(o for o in bpy.context.scene.objects if o.type == kind) for kind in ("ARMATURE", "MESH"))
+    bone = armature.pose.bones["sanguine"]
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        bone["anger"] = value
+        bone.keyframe_insert('["anger"]', frame=frame)
+    for frame in (1, 11):
+        bpy.context.scene.frame_set(frame)
+        result = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        print("VALUES", frame, result.data.shape_keys.key_blocks["browDownLeft"].value, result["blood_hemoglobin_cheeks"])
+"""
+
+OPEN = "bpy.ops.wm.open_mainfile(filepath={path!r}, use_scripts=False)"
+LINK = """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load({path!r}, link=True) as (found, wanted):
+        wanted.collections = ["face"]
+    scene = bpy.context.scene
+    override = wanted.collections[0].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    assert override.override_library and all(o.override_library for o in override.all_objects)
+"""
+
+
+@pytest.mark.parametrize("how", [OPEN, LINK], ids=["opened", "linked with an override"])
+def test_a_saved_face_answers_to_keys_without_the_add_on(face, tmp_path, how):
+    collection = bpy.data.collections.new("face")
+    bpy.context.scene.collection.children.link(collection)
+    for member in face:
+        bpy.context.scene.collection.objects.unlink(member)
+        collection.objects.link(member)
+    path = str(tmp_path / "face.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    script = textwrap.dedent(KEYED_ELSEWHERE).format(open=textwrap.dedent(how).strip().format(path=path))
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stderr
+    values = [list(map(float, line.split()[1:])) for line in run.stdout.splitlines() if line.startswith("VALUES")]
+    change = blood_change({"anger": 1.0}, "cheeks")[0]
+    assert values == [pytest.approx([1.0, 0.0, 0.0]), pytest.approx([11.0, 1.0, change])]

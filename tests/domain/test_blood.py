@@ -1,0 +1,116 @@
+"""Blood moves the way the evidence says, by amounts a body could make."""
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sanguine.domain.blood import (
+    ANATOMY,
+    BLOOD_CHANNELS,
+    BLOOD_CONTROL_MAX,
+    EVIDENCE,
+    blood_bounds,
+    blood_change,
+    read_anatomy,
+    read_blood,
+)
+from sanguine.domain.errors import InputError
+from sanguine.domain.facs import EMOTION_CONTROLS
+from sanguine.domain.resources import rigs_path
+
+mixes = st.fixed_dictionaries({name: st.floats(0.0, 1.0) for name in EMOTION_CONTROLS})
+LIGHT_SKIN_BLOOD = 0.014
+
+
+@pytest.mark.parametrize(
+    ("emotion", "regions", "sign"),
+    [
+        ("anger", ["cheeks", "forehead", "ears", "nose", "neck"], +1),
+        ("happy", ["cheeks"], +1),
+        ("happy", ["lips"], -1),
+        ("fear", ["cheeks", "lips", "nose"], -1),
+        ("sad", ["cheeks"], -1),
+    ],
+)
+def test_blood_moves_in_the_direction_of_the_evidence(emotion, regions, sign):
+    for region in regions:
+        assert sign * blood_change({emotion: 1.0}, region)[0] > 0.0, region
+
+
+def test_oxygen_reads_as_anger_and_its_lack_as_sadness():
+    """Nakajima 2017, Alkawaz 2015, Wibawa 2016."""
+    of = {emotion: blood_change({emotion: 1.0}, "cheeks")[1] for emotion in EMOTION_CONTROLS}
+    assert of["anger"] > of["happy"] > 0.0 > of["fear"] > of["sad"]
+
+
+def test_cheeks_change_enough_to_be_seen_on_light_skin():
+    """By the Monte Carlo of light skin, doubled blood is +2.2 a* and halved blood -2.0 a*: aims 3-4, and -1 or more."""
+    at_rest = LIGHT_SKIN_BLOOD * ANATOMY["cheeks"].hemoglobin
+    assert 2.2 < 1.0 + blood_change({"anger": 1.0}, "cheeks")[0] / at_rest < 3.0
+    assert 0.4 < 1.0 + blood_change({"fear": 1.0}, "cheeks")[0] / at_rest < 0.6
+
+
+@given(mixes, st.floats(0.0, BLOOD_CONTROL_MAX))
+def test_any_mix_stays_within_what_skin_can_hold(emotions, amount):
+    for region, rest in ANATOMY.items():
+        hemoglobin, oxygenation = blood_change(emotions, region, amount)
+        assert 0.001 - 1e-12 <= LIGHT_SKIN_BLOOD * rest.hemoglobin + hemoglobin <= 0.08
+        assert 0.3 <= 0.72 + rest.oxygenation + oxygenation <= 0.98
+
+
+@given(mixes)
+def test_a_mix_is_never_redder_or_paler_than_its_strongest_part(emotions):
+    for region in ANATOMY:
+        alone = [blood_change({name: 1.0}, region)[0] for name in EMOTION_CONTROLS]
+        assert min(0.0, *alone) <= blood_change(emotions, region)[0] <= max(0.0, *alone)
+
+
+@given(mixes, st.floats(0.0, BLOOD_CONTROL_MAX))
+def test_bounds_hold_the_change(emotions, amount):
+    for (region, quantity) in BLOOD_CHANNELS:
+        change = blood_change(emotions, region, amount)[quantity == "oxygenation"]
+        assert blood_bounds(emotions, amount, region, quantity) == (change, change)
+        low, high = blood_bounds({}, 1.0, region, quantity, mixable=True)
+        assert low <= change <= high
+
+
+def test_no_emotion_no_change_and_no_channel_without_a_change():
+    assert all(blood_change({}, region) == (0.0, 0.0) for region in ANATOMY)
+    assert all(c.response.low < 0.0 or c.response.high > 0.0 for c in BLOOD_CHANNELS.values())
+    assert blood_bounds({"anger": 1.0}, 1.0, "eyelids", "melanin") == (0.0, 0.0)
+
+
+def test_the_resting_face_follows_anatomy():
+    assert ANATOMY["lips"].hemoglobin > 2.0 and ANATOMY["lips"].melanin < 1.0
+    assert min(ANATOMY[r].hemoglobin for r in ("cheeks", "nose", "ears")) > 1.0 > ANATOMY["forehead"].hemoglobin
+    assert ANATOMY["neck"].hemoglobin < ANATOMY["forehead"].hemoglobin
+    assert ANATOMY["eyelids"].oxygenation < 0.0
+    assert min(ANATOMY[r].oil for r in ("forehead", "nose", "chin")) > 1.0 > ANATOMY["cheeks"].oil
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("value = 0.026,", "value = 0.26,", "anger cheeks hemoglobin: 0.26 would take the reference skin beyond 0.001 to 0.08"),
+        ('region = "cheeks"', 'region = "cheek"', "no such region, did you mean 'cheeks'?"),
+        ('"drummond1999_anger"', '"drummond1999"', "no such row in evidence.csv, did you mean 'drummond1999_anger'?"),
+        ('name = "anger"', 'name = "angry"', "emotion: angry: no such emotion, did you mean 'anger'?"),
+        ('region = "forehead"', 'region = "cheeks"', "anger cheeks hemoglobin: given twice, remove one"),
+        ('magnitude = "guess"', 'magnitude = "sure"', "emotion.0.change.0.magnitude: Input should be 'measured' or 'guess'"),
+    ],
+)  # fmt: skip
+def test_a_broken_blood_table_says_what_to_mend(tmp_path, old, new, message):
+    broken = tmp_path / "blood.toml"
+    broken.write_text(rigs_path("blood.toml").read_text().replace(old, new, 1))
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        read_blood(broken, ANATOMY, EVIDENCE)
+    assert str(caught.value).startswith(f"{broken}: ") and "\n" not in str(caught.value)
+
+
+def test_a_broken_anatomy_table_says_what_to_mend(tmp_path):
+    broken = tmp_path / "anatomy.toml"
+    broken.write_text(rigs_path("anatomy.toml").read_text().replace('"hemoglobin"', '"haemoglobin"', 1))
+    with pytest.raises(InputError, match="baseline.0.quantity: Input should be 'hemoglobin'"):
+        read_anatomy(broken, EVIDENCE)
