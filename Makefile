@@ -1,0 +1,92 @@
+# Sanguine: everything from a clean clone. `make help` lists the targets.
+#
+# Each step leaves a stamp and is skipped while it is current: packages by a hash
+# of their pinned lists, the native wheel by the age of its sources.
+
+# Blender 4.2 to 5.0 speak Python 3.11, which is Debian 12's own.
+PYTHON ?= /usr/bin/python3.11
+# Every Blender module that `make matrix` tests beside the one in .venv.
+MATRIX := 4.2.23 5.0.1 5.2.3
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip install --quiet --disable-pip-version-check
+# CMake, Ninja and auditwheel are the pinned ones from the environment.
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+
+hash = $(firstword $(shell cat $(1) | sha256sum))
+RUN_LISTS := tools/requirements-addon.txt tools/requirements-run.txt tools/requirements-build.txt
+TEST_LISTS := tools/requirements-test.txt
+RUN_STAMP := $(VENV)/.run-$(call hash,$(RUN_LISTS))
+TEST_STAMP := $(VENV)/.test-$(call hash,$(TEST_LISTS))
+NATIVE_STAMP := $(VENV)/.native
+ADDON_STAMP := $(VENV)/.addon
+OIIO := .cache/openimageio
+OIIO_STAMP := $(OIIO)/.fetched-$(call hash,tools/requirements-openimageio.txt tools/fetch_openimageio.py)
+
+# Folders are listed too: their time changes when a file comes or goes.
+NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
+    $(shell find native -mindepth 1 -name __pycache__ -prune -o -print)
+
+# Two steps that install into one environment must not run side by side.
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+.PHONY: help demo test native setup openimageio extension matrix clean system
+
+help: ## List the targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+demo: setup ## Install what is needed and render the five expressions into out/
+	$(VENV)/bin/sanguine render examples/five_expressions.toml --out out
+
+test: setup $(TEST_STAMP) ## Install what is needed and run every test
+	cmake --preset default
+	cmake --build --preset default
+	ctest --preset default
+	$(PY) -m pytest tests
+
+setup: system $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
+
+native: $(NATIVE_STAMP) ## Build the native wheel and install it into .venv
+
+openimageio: $(OIIO_STAMP) ## Fetch the libraries and headers of OpenImageIO
+
+extension: $(NATIVE_STAMP) ## Build the Blender extension into dist/
+	$(PY) tools/build_extension.py
+
+matrix: extension $(TEST_STAMP) ## Run the Blender tests on the other Blender versions
+	tools/matrix.sh $(MATRIX)
+
+clean: ## Remove what was built (environments and downloads stay)
+	rm -rf build dist out $(NATIVE_STAMP)
+
+system:
+	@tools/install_system_packages.sh
+
+$(PY): | system
+	$(PYTHON) -m venv $(VENV)
+
+$(RUN_STAMP): | $(PY)
+	$(PIP) --no-deps $(RUN_LISTS:%=--requirement %)
+	@rm -f $(VENV)/.run-* && touch $@
+
+$(TEST_STAMP): | $(RUN_STAMP)
+	$(PIP) --no-deps $(TEST_LISTS:%=--requirement %)
+	@rm -f $(VENV)/.test-* && touch $@
+
+$(OIIO_STAMP): | $(RUN_STAMP)
+	$(PY) tools/fetch_openimageio.py $(OIIO)
+	@touch $@
+
+# auditwheel copies the image libraries into the wheel under hashed names, so
+# that they never meet Blender's own.
+$(NATIVE_STAMP): $(NATIVE_SOURCES) $(RUN_STAMP) $(OIIO_STAMP)
+	rm -rf build/raw dist/wheels/sanguine_core-*
+	$(PY) -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir build/raw .
+	LD_LIBRARY_PATH=$(CURDIR)/$(OIIO)/lib auditwheel repair --wheel-dir dist/wheels build/raw/*.whl
+	$(PIP) --no-deps --force-reinstall dist/wheels/sanguine_core-*.whl
+	@touch $@
+
+$(ADDON_STAMP): addon/pyproject.toml addon/blender_manifest.toml | $(NATIVE_STAMP)
+	$(PIP) --no-deps --no-build-isolation --editable addon
+	@touch $@
