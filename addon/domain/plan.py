@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene
+from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, scattering
 from .errors import InputError, nearest
 from .parameters import PARAMETERS
 
@@ -51,18 +51,26 @@ class Plan:
 
     @property
     def active(self) -> tuple[Effect, ...]:
-        return tuple(effect for effect in EFFECTS if self.decisions[effect.id].active)
+        return tuple(e for e in EFFECTS if e.id in self.decisions and self.decisions[e.id].active)
+
+    def without(self, effect_id: str) -> Plan:
+        """The plan as it would be if one effect did not exist, to price that effect."""
+        return _decide(self.scene, tuple(effect for effect in EFFECTS if effect.id != effect_id))
 
     @property
     def entries(self) -> int:
-        """How many skins the table holds (1: a constant, no table)."""
-        return math.prod(axis.count for axis in self.axes)
+        """How many skins must be solved (1: a constant, no table; 0: nothing scatters)."""
+        return math.prod(axis.count for axis in self.axes) if scattering.EFFECT in self.active else 0
 
 
 def make_plan(scene: Scene) -> Plan:
     """Decides from the scene alone; does none of the work."""
-    decisions = {effect.id: effect.activate(scene) for effect in EFFECTS}
-    active = [effect for effect in EFFECTS if decisions[effect.id].active]
+    return _decide(scene, EFFECTS)
+
+
+def _decide(scene: Scene, effects: tuple[Effect, ...]) -> Plan:
+    decisions = {effect.id: effect.activate(scene) for effect in effects}
+    active = [effect for effect in effects if decisions[effect.id].active]
     axes = _axes(scene, active)
     fragments = [effect.fragment(scene) for effect in active]
     return Plan(

@@ -1,0 +1,162 @@
+"""The `render` use-case: every image of a shot, a manifest that grows with them, and a contact sheet."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import sanguine_core
+
+from ..domain.errors import InputError
+from ..domain.files import atomic, read_json, write_json
+from ..domain.parameters import skin_from
+from ..domain.plan import Plan, make_plan
+from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
+
+MANIFEST = "manifest.json"
+CONTACT_SHEET = "contact_sheet.png"
+# Beyond this a contact sheet shows nothing any more.
+_CONTACT_SHEET_IMAGES = 100
+_SUFFIXES = (".png", ".exr")
+
+
+class Renderer(Protocol):
+    """What the batch needs of Blender."""
+
+    def regions(self, subject: Subject) -> tuple[str, ...]:
+        """Regions whose masks the subject's face has."""
+
+    def prepare(self, shot: Shot, subject: Subject, plan: Plan) -> None:
+        """Builds the subject's scene in an empty file."""
+
+    def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:
+        """Renders one pose of the prepared subject: display-referred PNG and linear EXR of the same render."""
+
+
+def render_batch(
+    shot: Shot,
+    shot_path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    renderer: Renderer,
+    only: list[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> dict[str, Any]:
+    """Renders `shot` into the folder `out` and returns the manifest.
+
+    Each image and the manifest are written whole or not at all, so a run can be killed at any moment; with
+    `resume` an image is kept when its parameters and its checksum still agree with the manifest.
+    The plan is that of the whole shot even with `only`: one frame alone equals the same frame in sequence.
+    """
+    folder = Path(out)
+    kept = _finished(folder) if resume else {}
+    files = dict(kept)
+    # Written before the work as well as after each image: an unwritable folder is found at once.
+    _write_manifest(folder, shot_path, files)
+    wanted = [job for job in jobs(shot) if only is None or job.id in only]
+    done = 0
+    for subject in shot.subjects:
+        mine = [job for job in wanted if job.subject == subject.id]
+        plan = make_plan(scene_of(shot, subject, renderer.regions(subject)))
+        missing = []
+        for job in mine:
+            prints = _fingerprint(shot, subject, job)
+            if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in _SUFFIXES):
+                done += 1
+            else:
+                missing.append((job, prints))
+        if missing:
+            progress(f"preparing {subject.id}", done, len(wanted))
+            renderer.prepare(shot, subject, plan)
+        for job, prints in missing:
+            progress(f"rendering {job.id}", done, len(wanted))
+            files |= _render(shot, subject, plan, job, prints, folder, renderer)
+            _write_manifest(folder, shot_path, files)
+            done += 1
+    _contact_sheet(shot, folder, files)
+    _write_manifest(folder, shot_path, files)
+    progress("rendered", done, len(wanted))
+    return read_json(folder / MANIFEST)
+
+
+def _render(
+    shot: Shot, subject: Subject, plan: Plan, job: Job, fingerprint: str, folder: Path, renderer: Renderer
+) -> dict[str, dict[str, Any]]:
+    pose = pose_of(shot, job)
+    start = time.perf_counter()
+    with atomic(folder / f"{job.id}.png") as png, atomic(folder / f"{job.id}.exr") as exr:
+        renderer.render(pose, job.frame or 1, png, exr)
+        sums = {".png": _sha256(png), ".exr": _sha256(exr)}
+    row = {
+        "subject": subject.id,
+        "expression": job.expression,
+        "frame": job.frame,
+        "parameters": _parameters(shot, subject, job),
+        "effects": [e.id for e in plan.active if job.id in plan.decisions[e.id].frames],
+        "seconds": round(time.perf_counter() - start, 3),
+        "fingerprint": fingerprint,
+    }
+    return {job.id + suffix: {"file": job.id + suffix, "sha256": sums[suffix], **row} for suffix in _SUFFIXES}
+
+
+def _parameters(shot: Shot, subject: Subject, job: Job) -> dict[str, Any]:
+    return {
+        "head": subject.rig.head,
+        "skin": skin_from(subject.skin, "skin"),
+        "effects": dict(shot.effects),
+        "pose": pose_of(shot, job).model_dump(exclude={"id", "frame"}),
+        "light": shot.light.model_dump(),
+        "camera": shot.camera.model_dump(),
+        "image": shot.image.model_dump(),
+    }
+
+
+def _fingerprint(shot: Shot, subject: Subject, job: Job) -> str:
+    """Changes with anything that changes the image. The whole shot's plan is in it by its poses."""
+    poses = [pose_of(shot, other).model_dump(exclude={"id", "frame"}) for other in jobs(shot) if other.subject == subject.id]
+    what = [sanguine_core.__version__, _parameters(shot, subject, job), poses]
+    return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _finished(folder: Path) -> dict[str, dict[str, Any]]:
+    """Files of an earlier manifest that are there and whole."""
+    if not (folder / MANIFEST).exists():
+        return {}
+    data = read_json(folder / MANIFEST)
+    rows = data.get("files") if isinstance(data, dict) else None
+    if not isinstance(rows, list) or not all(isinstance(row, dict) and "file" in row for row in rows):
+        raise InputError(f"{folder / MANIFEST}: files: not a manifest of sanguine; remove it or leave --resume out")
+    whole = {}
+    for row in rows:
+        path = folder / Path(str(row["file"])).name
+        if path.is_file() and _sha256(path) == row.get("sha256"):
+            whole[row["file"]] = row
+    return whole
+
+
+def _write_manifest(folder: Path, shot_path: str | os.PathLike[str], files: dict[str, dict[str, Any]]) -> None:
+    write_json(
+        folder / MANIFEST,
+        {"sanguine": sanguine_core.__version__, "shot": Path(shot_path).name,
+         "files": [files[name] for name in sorted(files)]},
+    )
+
+
+def _contact_sheet(shot: Shot, folder: Path, files: dict[str, dict[str, Any]]) -> None:
+    """All images of the shot side by side, once they are all there."""
+    every = [job.id for job in jobs(shot)]
+    if len(every) > _CONTACT_SHEET_IMAGES or any(f"{name}.png" not in files for name in every):
+        return
+    with atomic(folder / CONTACT_SHEET) as path:
+        sanguine_core.contact_sheet([str(folder / f"{name}.png") for name in every], every, str(path))
+    files[CONTACT_SHEET] = {"file": CONTACT_SHEET, "sha256": _sha256(folder / CONTACT_SHEET), "of": every}

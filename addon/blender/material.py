@@ -1,0 +1,192 @@
+"""The skin material of a plan: a node group with ranges and tooltips around two OSL scripts and a packed table.
+
+Everything the material reads at render time is a custom property, a mesh attribute or a packed image, so the
+file renders the same without the add-on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import bpy
+import numpy as np
+
+from ..domain.effects import EFFECTS, ShaderInput
+from ..domain.lut import QUANTITIES, Table, bake
+from ..domain.parameters import PARAMETERS
+from ..domain.plan import Plan
+from ..domain.shader import Shader, assemble, lobe_sockets
+from .colour import working_space
+from .images import data_image
+from .osl import script_node
+
+_BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
+# Heights come in mm; the Bump node wants the height of "1" in scene units.
+_MM_PER_M = 1000.0
+
+
+def build_skin_material(
+    name: str, plan: Plan, maps: Mapping[str, np.ndarray], progress: Callable[[int, int], bool] | None = None
+) -> bpy.types.Material:
+    """A new material for `plan`. maps: map id -> (H, W, 3 or 4) float32, row 0 lowest, for each of `plan.maps`."""
+    table = bake(plan.axes, plan.scene.skin, working_space(), progress)
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = _group(name, plan, table, maps)
+    group.name = group.label = name
+    group.width = 220
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    output.location = (300, 0)
+    tree.links.new(group.outputs["BSDF"], output.inputs["Surface"])
+    material["sanguine"] = {"effects": [effect.id for effect in plan.active], "entries": plan.entries}
+    return material
+
+
+def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) -> bpy.types.NodeTree:
+    tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    build = _Builder(name, tree, plan, maps)
+    tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    chromophores, surface = assemble(plan)
+    points = build.script("chromophores", chromophores)
+    lobes = build.script("surface", surface)
+    build.base_values(points)
+    unit_per_mm = 1.0 / (_MM_PER_M * bpy.context.scene.unit_settings.scale_length)
+    lobes.inputs["unit_per_mm"].default_value = unit_per_mm
+    if table.axes:
+        build.read_table(table, points, lobes)
+    else:
+        for socket, value in zip(lobe_sockets(), table.image.reshape(QUANTITIES, 3), strict=True):
+            lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
+    if "film" in points.outputs:
+        build.link(points.outputs["film"], lobes.inputs["film"])
+    if "height_mm" in points.outputs:
+        bump = build.node("ShaderNodeBump")
+        bump.inputs["Distance"].default_value = unit_per_mm
+        build.link(points.outputs["height_mm"], bump.inputs["Height"])
+        build.link(bump.outputs["Normal"], lobes.inputs["Normal"])
+    end = build.node("NodeGroupOutput")
+    build.link(lobes.outputs["BSDF"], end.inputs["BSDF"])
+    build.arrange(points, lobes, end)
+    return tree
+
+
+class _Builder:
+    """Nodes of one group, each source of a value made once."""
+
+    def __init__(self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, np.ndarray]) -> None:
+        self.name, self.tree, self.plan = name, tree, plan
+        self.begin = tree.nodes.new("NodeGroupInput")
+        self.sources: dict[tuple[str, str], bpy.types.NodeSocket] = {}
+        self.images = {key: data_image(f"{name} {key}", maps[key]) for key in plan.maps}
+
+    def node(self, kind: str) -> bpy.types.Node:
+        return self.tree.nodes.new(kind)
+
+    def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
+        self.tree.links.new(source, target)
+
+    def script(self, stage: str, shader: Shader) -> bpy.types.Node:
+        node = script_node(self.tree, f"{self.name} {stage}", shader.source)
+        for item in shader.inputs:
+            self.link(self.source(item), node.inputs[item.name])
+        return node
+
+    def base_values(self, points: bpy.types.Node) -> None:
+        """The skin's own values: a slider where the table or a film can follow it, a number where it is fixed."""
+        follows = {axis.id for axis in self.plan.axes}
+        for socket, key in _BASE.items():
+            if key in follows:
+                self.link(self.source(ShaderInput(socket, "float", "parameter", key)), points.inputs[socket])
+            else:
+                points.inputs[socket].default_value = self.plan.scene.skin[key]
+        if "film" in points.outputs:
+            self.link(self.source(ShaderInput("skin_oil", "float", "parameter", "oil")), points.inputs["skin_oil"])
+
+    def source(self, item: ShaderInput) -> bpy.types.NodeSocket:
+        """The socket that carries the value of `item`."""
+        at = (item.source, item.key)
+        if at not in self.sources:
+            self.sources[at] = getattr(self, "_from_" + item.source.replace(":", "_"))(item.key)
+        return self.sources[at]
+
+    def _from_parameter(self, key: str) -> bpy.types.NodeSocket:
+        row = PARAMETERS[key]
+        return self._slider(row.label, self.plan.scene.skin[key], row.hard_min, row.hard_max, row.help)
+
+    def _from_strength(self, key: str) -> bpy.types.NodeSocket:
+        effect = next(effect for effect in EFFECTS if effect.id == key)
+        return self._slider(effect.label, self.plan.scene.strengths[key], 0.0, 1.0, effect.help)
+
+    def _slider(self, label: str, value: float, low: float, high: float, help: str) -> bpy.types.NodeSocket:
+        socket = self.tree.interface.new_socket(label, in_out="INPUT", socket_type="NodeSocketFloat")
+        socket.min_value, socket.max_value = low, high
+        socket.default_value = value
+        socket.description = help
+        return self.begin.outputs[label]
+
+    def _from_object(self, key: str) -> bpy.types.NodeSocket:
+        return self._attribute("OBJECT", key).outputs["Fac"]
+
+    def _from_vertex(self, key: str) -> bpy.types.NodeSocket:
+        return self._attribute("GEOMETRY", key).outputs["Vector"]
+
+    def _attribute(self, kind: str, key: str) -> bpy.types.Node:
+        node = self.node("ShaderNodeAttribute")
+        node.attribute_type = kind
+        node.attribute_name = key
+        return node
+
+    def _from_map(self, key: str) -> bpy.types.NodeSocket:
+        node = self.node("ShaderNodeTexImage")
+        node.image = self.images[key]
+        node.interpolation = "Linear"
+        node.extension = "EXTEND"
+        node.label = key
+        self.sources["map", key] = node.outputs["Color"]
+        self.sources["map:alpha", key] = node.outputs["Alpha"]
+        return node.outputs["Color"]
+
+    def _from_map_alpha(self, key: str) -> bpy.types.NodeSocket:
+        self._from_map(key)
+        return self.sources["map:alpha", key]
+
+    def read_table(self, table: Table, points: bpy.types.Node, lobes: bpy.types.Node) -> None:
+        """One Image Texture node per quantity (and slice), all on one packed image."""
+        image = data_image(f"{self.name} table", table.image)
+        slices = {"": "table_low"} if len(table.axes) < 3 else {"": "table_low", "_high": "table_high"}
+        for suffix, coordinates in slices.items():
+            for quantity, socket in enumerate(lobe_sockets(suffix)):
+                shift = self.node("ShaderNodeVectorMath")
+                shift.operation = "ADD"
+                shift.inputs[1].default_value = (0.0, table.quantity_offset(quantity), 0.0)
+                self.link(points.outputs[coordinates], shift.inputs[0])
+                node = self.node("ShaderNodeTexImage")
+                node.image = image
+                node.interpolation = "Linear"
+                node.extension = "EXTEND"
+                node.label = socket
+                self.link(shift.outputs["Vector"], node.inputs["Vector"])
+                self.link(node.outputs["Color"], lobes.inputs[socket])
+        if len(table.axes) > 2:
+            self.link(points.outputs["table_mix"], lobes.inputs["table_mix"])
+
+    def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
+        """Columns from left to right, so that a person can read the group."""
+        points.location, lobes.location, end.location = (0, 0), (900, 0), (1200, 0)
+        columns = {"ShaderNodeAttribute": -600, "ShaderNodeVectorMath": 300, "ShaderNodeBump": 600}
+        heights: dict[int, int] = {}
+        self.begin.location = (-600, 500)
+        for node in self.tree.nodes:
+            if node in (points, lobes, end, self.begin):
+                continue
+            if node.bl_idname == "ShaderNodeTexImage":
+                x = 550 if node.inputs["Vector"].is_linked else -300
+            else:
+                x = columns.get(node.bl_idname, 300)
+            y = heights.get(x, 0)
+            node.hide = True
+            node.location = (x, y)
+            heights[x] = y - 60

@@ -1,0 +1,33 @@
+"""OSL script nodes from source text, kept inside the file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+
+
+def find_oslquery() -> None:
+    """Puts Blender's own packages on the path where they are not: in `bpy` as a module they are left off.
+
+    Without `oslquery` a script node gets no sockets. Appended, so that nothing of the user's is shadowed.
+    """
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    packages = Path(bpy.utils.resource_path("LOCAL")) / "python" / "lib" / version / "site-packages"
+    if packages.is_dir() and str(packages) not in sys.path:
+        sys.path.append(str(packages))
+
+
+def script_node(tree: bpy.types.NodeTree, name: str, source: str) -> bpy.types.Node:
+    """A script node in INTERNAL mode: text and bytecode are stored in the file. Raises RuntimeError with the log."""
+    find_oslquery()
+    text = bpy.data.texts.new(f"{name}.osl")
+    text.write(source)
+    node = tree.nodes.new("ShaderNodeScript")
+    node.name = node.label = name
+    node.mode = "INTERNAL"
+    node.script = text
+    if not node.outputs:
+        raise RuntimeError(f"{name}: OSL did not compile; Blender's console has the reason")
+    return node

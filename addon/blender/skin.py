@@ -1,0 +1,45 @@
+"""Giving a face its skin: maps, material, and the blood that its controls move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from ..app.maps import bake_maps
+from ..domain.blood import BLOOD_CHANNELS
+from ..domain.plan import Plan
+from .controls import drive_blood
+from .material import build_skin_material
+from .surface import read_surface, store_rest
+
+
+def apply_skin(
+    face: bpy.types.Object,
+    armature: bpy.types.Object | None,
+    plan: Plan,
+    slot: int = 0,
+    progress: Callable[[int, int], bool] | None = None,
+) -> bpy.types.Material:
+    """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`."""
+    maps = bake_maps(plan.maps, read_surface(face)) if plan.maps else {}
+    material = build_skin_material(f"{face.name} skin", plan, maps, progress)
+    inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
+    if "rest_mm" in inputs:
+        store_rest(face)
+    if face.data.materials:
+        face.data.materials[slot] = material
+    else:
+        face.data.materials.append(material)
+    if armature is not None:
+        drive_blood(armature, face, [c for c in BLOOD_CHANNELS.values() if c.property_name in inputs])
+    return material
+
+
+def skin_slot(face: bpy.types.Object) -> int:
+    """The slot that holds the skin: the one named so, or the one that most faces use."""
+    for i, slot in enumerate(face.material_slots):
+        if "skin" in slot.name.lower():
+            return i
+    indices = [polygon.material_index for polygon in face.data.polygons]
+    return max(set(indices), key=indices.count) if indices else 0

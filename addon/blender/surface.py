@@ -1,0 +1,71 @@
+"""A face mesh as the maps need it. Region masks are vertex groups, which an artist can paint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import bpy
+import numpy as np
+
+from ..app.maps import Surface
+from ..domain.blood import ANATOMY
+from ..domain.errors import InputError
+
+GROUP_PREFIX = "sanguine_"
+REST_ATTRIBUTE = "rest_mm"
+"""Vertex positions of the neutral face in mm: noise of the material holds on to them while the face moves."""
+
+
+def store_regions(obj: bpy.types.Object, regions: Mapping[str, np.ndarray]) -> None:
+    """Masks (V,) 0-1 as vertex groups `sanguine_<region>`. A group that is there is kept: it may be painted."""
+    for region, mask in regions.items():
+        name = GROUP_PREFIX + region
+        if name in obj.vertex_groups:
+            continue
+        group = obj.vertex_groups.new(name=name)
+        # One call per weight is slow for Blender's API, so weights go in 1/255 steps, finer than a painted mask.
+        levels = np.round(np.asarray(mask) * 255.0).astype(np.int32)
+        for level in np.unique(levels[levels > 0]):
+            group.add(np.nonzero(levels == level)[0].tolist(), float(level) / 255.0, "REPLACE")
+
+
+def face_regions(obj: bpy.types.Object) -> tuple[str, ...]:
+    """Regions that the mesh has masks for, in the order of the anatomy table."""
+    return tuple(region for region in ANATOMY if GROUP_PREFIX + region in obj.vertex_groups)
+
+
+def store_rest(obj: bpy.types.Object) -> None:
+    """Writes the neutral positions, in mm, as a vertex attribute."""
+    mesh = obj.data
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    attribute = mesh.attributes.get(REST_ATTRIBUTE) or mesh.attributes.new(REST_ATTRIBUTE, "FLOAT_VECTOR", "POINT")
+    mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
+    attribute.data.foreach_set("vector", positions * mm_per_unit)
+
+
+def read_surface(obj: bpy.types.Object) -> Surface:
+    """UVs, triangles and region masks of a mesh. Raises InputError when it has no UV map."""
+    mesh = obj.data
+    if mesh.uv_layers.active is None:
+        raise InputError(f"{obj.name}: no UV map, which the chromophore maps need: unwrap it first")
+    corners = len(mesh.loops)
+    uv = np.empty(corners * 2, dtype=np.float32)
+    mesh.uv_layers.active.data.foreach_get("uv", uv)
+    corner_vertex = np.empty(corners, dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner_vertex)
+    mesh.calc_loop_triangles()
+    triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", triangles)
+    regions = {region: _weights(obj, region) for region in face_regions(obj)}
+    return Surface(uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions)
+
+
+def _weights(obj: bpy.types.Object, region: str) -> np.ndarray:
+    index = obj.vertex_groups[GROUP_PREFIX + region].index
+    weights = np.zeros(len(obj.data.vertices), dtype=np.float32)
+    for vertex in obj.data.vertices:
+        for element in vertex.groups:
+            if element.group == index:
+                weights[vertex.index] = element.weight
+    return weights

@@ -1,0 +1,151 @@
+"""`sanguine VERB …`: the same verbs in a shell (`.venv/bin/sanguine`) and as `blender --command sanguine VERB …`.
+
+Exit status: 0 when all that was asked was done, 2 for bad input (one line), 1 for any other failure.
+Results go to `--out` or, without it, to standard output; progress and messages go to standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from ..domain.errors import InputError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = _parser()
+    try:
+        options = parser.parse_args(arguments)
+        return options.run(options)
+    except InputError as error:
+        print(f"sanguine: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("sanguine: interrupted", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`); what it wanted it has.
+        sys.stderr.close()
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="sanguine", description="Physiologically based skin for Blender.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+
+    skin = _verb(verbs, "skin", _skin, "what colour is this skin, and how far does light spread in it")
+    skin.add_argument("skins", metavar="SKIN.json")
+    skin.add_argument("--wavelengths", default="380:780:10", metavar="FIRST:LAST:STEP",
+                      help="nm, a range or a list with commas (default %(default)s)")
+    skin.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
+    plan = _verb(verbs, "plan", _plan, "what a shot will simulate, and why, without doing it")
+    plan.add_argument("shot", metavar="SHOT.toml")
+    plan.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
+    render = _verb(verbs, "render", _render, "render a shot: one image per subject, expression and frame")
+    render.add_argument("shot", metavar="SHOT.toml")
+    render.add_argument("--out", required=True, metavar="DIR", help="folder for the images and manifest.json")
+    render.add_argument("--only", metavar="ID,…", help="only these images")
+    render.add_argument("--resume", action="store_true", help="keep what an earlier run of the same shot finished")
+    return parser
+
+
+def _verb(verbs: Any, name: str, run: Any, help: str) -> argparse.ArgumentParser:
+    verb = verbs.add_parser(name, help=help, description=help[0].upper() + help[1:] + ".")
+    verb.add_argument("--json-progress", action="store_true",
+                      help="progress as one JSON object per line on standard error, for farms")
+    verb.set_defaults(run=run)
+    return verb
+
+
+class _Version(argparse.Action):
+    """Imports the native module only when asked, so that `--help` stays quick."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        import sanguine_core
+
+        print(f"sanguine {sanguine_core.__version__}")
+        parser.exit(0)
+
+
+def _skin(options: argparse.Namespace) -> int:
+    from ..app.skin_report import read_skins, report
+
+    wavelengths_nm = _wavelengths(options.wavelengths)
+    ids, skins = read_skins(options.skins)
+    _answer(report(ids, skins, wavelengths_nm), options.out)
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from ..app.planning import plan_report
+    from ..domain.head import REGIONS
+    from ..domain.shot import read_shot
+
+    _answer(plan_report(read_shot(options.shot), REGIONS), options.out)
+    return 0
+
+
+def _render(options: argparse.Namespace) -> int:
+    from ..app.batch import render_batch
+    from ..domain.shot import jobs, read_shot
+    from .progress import reporter
+
+    shot = read_shot(options.shot)
+    only = None
+    if options.only is not None:
+        only = [name for name in options.only.split(",") if name]
+        known = [job.id for job in jobs(shot)]
+        for name in only:
+            if name not in known:
+                from ..domain.errors import nearest
+
+                raise InputError(f"--only: no image '{name}' in {options.shot}, {nearest(name, known)}")
+    try:
+        from ..blender.render import BlenderRenderer
+    except ModuleNotFoundError as error:
+        if error.name not in ("bpy", "_bpy"):
+            raise
+        raise InputError("render: no Blender module: run this inside Blender, or `pip install bpy==4.5.15`") from None
+    with reporter(options.json_progress) as progress:
+        render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
+                     progress=progress)
+    return 0
+
+
+def _wavelengths(text: str) -> Any:
+    import numpy as np
+
+    try:
+        if ":" in text:
+            first, last, step = (float(part) for part in text.split(":"))
+            if not step > 0 or not first <= last or (last - first) / step > 100_000:
+                raise ValueError
+            # Half a step of slack: 380:780:10 ends on 780 whatever the rounding.
+            values = np.arange(first, last + 0.5 * step, step)
+        else:
+            values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise InputError(f"--wavelengths: {text!r} is not FIRST:LAST:STEP or a list like 450,550,650 (nm)") from None
+    if not np.all((values >= 380.0) & (values <= 780.0)):
+        raise InputError(f"--wavelengths: {text!r} leaves 380 to 780 nm")
+    return values
+
+
+def _answer(data: dict[str, Any], out: str | None) -> None:
+    if out is None:
+        json.dump(data, sys.stdout, indent=1, allow_nan=False)
+        print()
+    else:
+        from ..domain.files import write_json
+
+        write_json(out, data)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,244 @@
+"""SHOT.toml: who is seen, in which expressions or keyed timeline, under which light, as which images."""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import Annotated, Literal
+
+import pydantic
+
+from .effects import Frame, Scene
+from .errors import InputError, nearest
+from .facs import ACTION_UNITS, EMOTIONS
+from .files import read_toml, validate
+from .head import HEADS
+from .parameters import skin_from
+from .plan import check_strengths
+
+_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_MAX_IMAGES = 100_000  # per shot; a study of thousands fits, a typing error in a frame range does not
+
+Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+
+
+class _Table(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+def _check_id(value: str) -> str:
+    if not _ID.fullmatch(value):
+        raise ValueError("an id names a file: letters, digits, '_', '-', '.', beginning with a letter or digit")
+    return value
+
+
+Id = Annotated[str, pydantic.AfterValidator(_check_id)]
+
+
+class Rig(_Table):
+    """The face: a head preset of `rigs/heads.toml`."""
+
+    head: str
+
+    @pydantic.field_validator("head")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in HEADS:
+            raise ValueError(f"no such head, {nearest(value, HEADS)}")
+        return value
+
+
+class Subject(_Table):
+    """One person: a rig and a skin. A shot has several, or one by its top-level `rig` and `skin`."""
+
+    id: Id
+    rig: Rig
+    skin: dict[str, float] = {}
+
+
+class Pose(_Table):
+    """Emotions and action units, each 0-1, and the strength of the blood's answer."""
+
+    emotions: dict[str, Fraction] = {}
+    action_units: dict[str, Fraction] = {}
+    blood: Annotated[float, pydantic.Field(ge=0.0, le=2.0, allow_inf_nan=False)] = 1.0
+
+    @pydantic.field_validator("emotions")
+    @classmethod
+    def _emotions(cls, value: dict[str, float]) -> dict[str, float]:
+        for name in value:
+            if name not in EMOTIONS:
+                raise ValueError(f"no such emotion '{name}', {nearest(name, EMOTIONS)}")
+        return value
+
+    @pydantic.field_validator("action_units")
+    @classmethod
+    def _units(cls, value: dict[str, float]) -> dict[str, float]:
+        known = [unit.control for unit in ACTION_UNITS.values()]
+        for name in value:
+            if name not in known:
+                raise ValueError(f"no such action unit '{name}', {nearest(name, known)}")
+        return value
+
+
+class Expression(Pose):
+    """A still: one image per subject."""
+
+    id: Id
+
+
+class Key(Pose):
+    """A pose at a frame of a timeline."""
+
+    frame: Annotated[int, pydantic.Field(ge=0, le=1_048_574)]
+
+
+class Timeline(_Table):
+    """Keyed poses; frames first to last by step are rendered."""
+
+    first: Annotated[int, pydantic.Field(ge=0, le=1_048_574)] = 1
+    last: Annotated[int, pydantic.Field(ge=0, le=1_048_574)]
+    step: Annotated[int, pydantic.Field(ge=1)] = 1
+    key: Annotated[list[Key], pydantic.Field(min_length=1)]
+
+
+class Light(_Table):
+    """The portrait light: `strength` scales all lamps."""
+
+    rig: Literal["portrait"] = "portrait"
+    strength: Annotated[float, pydantic.Field(ge=0.0, le=100.0)] = 1.0
+
+
+class Camera(_Table):
+    focal_mm: Annotated[float, pydantic.Field(ge=20.0, le=300.0)] = 85.0
+    yaw_degrees: Annotated[float, pydantic.Field(ge=-180.0, le=180.0)] = 0.0
+
+
+class Image(_Table):
+    width: Annotated[int, pydantic.Field(ge=16, le=16384)] = 640
+    height: Annotated[int, pydantic.Field(ge=16, le=16384)] = 800
+    samples: Annotated[int, pydantic.Field(ge=1, le=65536)] = 64
+    denoise: bool = True
+    view_transform: str = ""
+    seed: Annotated[int, pydantic.Field(ge=0, le=2_147_483_647)] = 0
+
+
+class Shot(_Table):
+    """A whole SHOT.toml."""
+
+    rig: Rig | None = None
+    skin: dict[str, float] = {}
+    effects: dict[str, float] = {}
+    subject: list[Subject] = []
+    expression: list[Expression] = []
+    timeline: Timeline | None = None
+    light: Light = Light()
+    camera: Camera = Camera()
+    image: Image = Image()
+
+    @property
+    def subjects(self) -> list[Subject]:
+        if self.subject:
+            return self.subject
+        assert self.rig is not None  # read_shot saw to it
+        return [Subject(id="subject", rig=self.rig, skin=self.skin)]
+
+
+class Job(_Table):
+    """One image: whose, in which pose, at which frame."""
+
+    id: str
+    subject: str
+    expression: str | None
+    frame: int | None
+
+
+def read_shot(path: str | os.PathLike[str]) -> Shot:
+    """A checked shot. Raises InputError, one line that names the file, the key and the mend."""
+    shot = validate(Shot, read_toml(path), path)
+    if bool(shot.subject) == (shot.rig is not None):
+        raise InputError(f"{path}: rig: give one [rig] with its [skin], or [[subject]] tables, not "
+                         + ("both" if shot.subject else "neither"))
+    if bool(shot.expression) == (shot.timeline is not None):
+        raise InputError(f"{path}: expression: give [[expression]] tables or one [timeline], not "
+                         + ("both" if shot.expression else "neither"))
+    for key, ids in (("subject", shot.subject), ("expression", shot.expression)):
+        seen: set[str] = set()
+        for item in ids:
+            if item.id in seen:
+                raise InputError(f"{path}: {key}: two have the id '{item.id}'")
+            seen.add(item.id)
+    for subject in shot.subjects:
+        skin_from(subject.skin, f"{path}: skin" if not shot.subject else f"{path}: subject {subject.id}: skin")
+    check_strengths(shot.effects, f"{path}: effects")
+    if shot.timeline and shot.timeline.last < shot.timeline.first:
+        raise InputError(f"{path}: timeline.last: {shot.timeline.last} is before the first frame, {shot.timeline.first}")
+    if (count := _count(shot)) > _MAX_IMAGES:
+        raise InputError(f"{path}: {count} images are more than the {_MAX_IMAGES} of one shot: split it")
+    return shot
+
+
+def _count(shot: Shot) -> int:
+    poses = len(shot.expression) if not shot.timeline else len(_frames(shot.timeline))
+    return poses * len(shot.subjects)
+
+
+def _frames(timeline: Timeline) -> range:
+    return range(timeline.first, timeline.last + 1, timeline.step)
+
+
+def jobs(shot: Shot) -> list[Job]:
+    """Every image of the shot in the order of rendering. Ids are file names without their suffix."""
+    several = len(shot.subjects) > 1
+    made = []
+    for subject in shot.subjects:
+        prefix = f"{subject.id}_" if several else ""
+        if shot.timeline:
+            made += [
+                Job(id=f"{prefix}{frame:06d}", subject=subject.id, expression=None, frame=frame)
+                for frame in _frames(shot.timeline)
+            ]
+        else:
+            made += [
+                Job(id=f"{prefix}{item.id}", subject=subject.id, expression=item.id, frame=None)
+                for item in shot.expression
+            ]
+    return made
+
+
+def pose_of(shot: Shot, job: Job) -> Pose:
+    """The pose of a job; between keys of a timeline it is linear, outside them it holds."""
+    if shot.timeline is None:
+        return next(item for item in shot.expression if item.id == job.expression)
+    keys = sorted(shot.timeline.key, key=lambda key: key.frame)
+    before = max((k for k in keys if k.frame <= job.frame), key=lambda k: k.frame, default=keys[0])
+    after = min((k for k in keys if k.frame >= job.frame), key=lambda k: k.frame, default=keys[-1])
+    if before.frame >= after.frame:
+        return before
+    t = (job.frame - before.frame) / (after.frame - before.frame)
+
+    def blend(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
+        return {name: (1 - t) * a.get(name, 0.0) + t * b.get(name, 0.0) for name in {**a, **b}}
+
+    return Pose(
+        emotions=blend(before.emotions, after.emotions),
+        action_units=blend(before.action_units, after.action_units),
+        blood=(1 - t) * before.blood + t * after.blood,
+    )
+
+
+def scene_of(shot: Shot, subject: Subject, regions: tuple[str, ...]) -> Scene:
+    """What the planner may know of one subject of a shot."""
+    frames = []
+    for job in jobs(shot):
+        if job.subject != subject.id:
+            continue
+        pose = pose_of(shot, job)
+        emotions = {name: value for name, value in pose.emotions.items() if value > 0.0}
+        frames.append(Frame(job.id, emotions, pose.blood))
+    return Scene(
+        skin=skin_from(subject.skin, "skin"),
+        frames=tuple(frames),
+        strengths=check_strengths(shot.effects, "effects"),
+        regions=regions,
+    )
