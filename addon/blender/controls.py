@@ -83,6 +83,8 @@ def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> Non
     """Sets sliders by name. Raises InputError for an unknown name or a value outside the slider."""
     bone = armature.pose.bones[CONTROL_BONE]
     for name, value in values.items():
+        if name in EMOTIONS and name not in CONTROLS:
+            continue  # neutral is a face to ask for, not a slider
         if name not in CONTROLS:
             raise InputError(f"{name}: no such control, {nearest(name, CONTROLS)}")
         if not 0.0 <= value <= CONTROLS[name].maximum:

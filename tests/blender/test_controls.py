@@ -143,7 +143,7 @@ def test_a_hidden_armature_is_refused_with_what_to_do():
 
 def test_adding_twice_keeps_what_was_set(face):
     armature, _ = face
-    controls.set_controls(armature, {"fear": 0.5})
+    controls.set_controls(armature, {"fear": 0.5, "neutral": 1.0})
     assert controls.add_controls(armature)["fear"] == 0.5
 
 
