@@ -70,12 +70,13 @@ PixelsOut rasterize_uv(const UvIn& uv, const TrianglesIn& triangles, const Value
     return to_numpy(std::move(image));
 }
 
-sanguine::PixelType pixel_type_named(const std::string& name) {
-    if (name == "uint8") return sanguine::PixelType::uint8;
-    if (name == "uint16") return sanguine::PixelType::uint16;
-    if (name == "half") return sanguine::PixelType::half;
-    if (name == "float") return sanguine::PixelType::float32;
-    throw std::invalid_argument("pixel_type: '" + name + "' is not one of uint8, uint16, half, float");
+std::optional<sanguine::PixelType> pixel_type_named(const std::optional<std::string>& name) {
+    if (!name) return {};
+    if (*name == "uint8") return sanguine::PixelType::uint8;
+    if (*name == "uint16") return sanguine::PixelType::uint16;
+    if (*name == "half") return sanguine::PixelType::half;
+    if (*name == "float") return sanguine::PixelType::float32;
+    throw std::invalid_argument("pixel_type: '" + *name + "' is not one of uint8, uint16, half, float");
 }
 
 /// The wheel carries it beside the module.
@@ -136,14 +137,14 @@ Raises ImageError (an OSError) that names the file.)");
 
     m.def(
         "write_image",
-        [](const fs::path& path, const PixelsIn& pixels, std::optional<std::string> pixel_type) {
-            const auto type = pixel_type ? pixel_type_named(*pixel_type) : sanguine::usual_pixel_type(path);
+        [](const fs::path& path, const PixelsIn& pixels, const std::optional<std::string>& pixel_type) {
+            const auto type = pixel_type_named(pixel_type);
             const sanguine::ImageView image = view(pixels);
             nb::gil_scoped_release release;
             sanguine::write_image(path, image, type);
         },
         "path"_a, "pixels"_a, "pixel_type"_a = nb::none(),
-        R"(Write (H, W, C) float32, row 0 at the bottom, in the format of the file name's extension.
+        R"(Write (H, W, C) float32, row 0 at the bottom, as EXR, TIFF, PNG or JPEG (by the file name's extension).
 
 `pixel_type` is "uint8", "uint16", "half" or "float"; None takes half for EXR, float for TIFF and uint8 for others.
 Values are not colour managed. The file appears whole or not at all. Raises ImageError (an OSError).)");

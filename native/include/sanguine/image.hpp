@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -26,8 +27,8 @@ struct Image {
     Image() = default;
     /// The pixels are not initialised: memory is touched only as data arrives, so a file whose header promises
     /// more than it holds costs nothing.
-    Image(int width, int height, int channels)
-        : width(width), height(height), channels(channels), pixels(std::make_unique_for_overwrite<float[]>(size())) {}
+    Image(int columns, int rows, int values)
+        : width(columns), height(rows), channels(values), pixels(std::make_unique_for_overwrite<float[]>(size())) {}
 
     std::size_t row_size() const { return std::size_t(width) * std::size_t(channels); }
     std::size_t size() const { return row_size() * std::size_t(height); }
@@ -49,15 +50,12 @@ struct ImageView {
 /// How a channel is stored in the file.
 enum class PixelType { uint8, uint16, half, float32 };
 
-/// What a format is usually written with: half for EXR, float for TIFF, 8 bits for the others.
-PixelType usual_pixel_type(const std::filesystem::path& path);
-
 /// Read any format that OpenImageIO knows, first subimage. Alpha is left as stored. Throws ImageError.
 Image read_image(const std::filesystem::path& path);
 
-/// Write in the format that the file name's extension asks for. The file appears whole or not at all.
-/// Throws ImageError.
-void write_image(const std::filesystem::path& path, const ImageView& image, PixelType type);
+/// Write EXR, TIFF, PNG or JPEG, as the file name's extension says; without a type, half for EXR, float for TIFF and
+/// 8 bits for the others. The file appears whole or not at all. Throws ImageError.
+void write_image(const std::filesystem::path& path, const ImageView& image, std::optional<PixelType> type = {});
 
 struct ContactSheetLayout {
     int columns = 5;

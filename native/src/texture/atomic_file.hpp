@@ -5,7 +5,7 @@
 
 #include <atomic>
 #include <filesystem>
-#include <string>
+#include <sstream>
 
 #include "sanguine/image.hpp"
 
@@ -18,9 +18,11 @@ public:
         // In the same folder, because a rename across file systems is a copy; with the same extension, because
         // OpenImageIO chooses the format by it.
         static std::atomic<unsigned> counter{0};
+        std::ostringstream name;
+        name << '.' << path_.stem().string() << '.' << getpid() << '-' << counter++ << ".tmp"
+             << path_.extension().string();
         temporary_ = path_;
-        temporary_.replace_filename("." + path_.stem().string() + "." + std::to_string(getpid()) + "-" +
-                                    std::to_string(counter++) + ".tmp" + path_.extension().string());
+        temporary_.replace_filename(name.str());
     }
     ~AtomicFile() {
         std::error_code ignored;  // after a commit there is nothing to remove

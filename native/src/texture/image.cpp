@@ -53,7 +53,7 @@ void write_pixels(const fs::path& path, OIIO::ImageSpec spec, OIIO::TypeDesc mem
     spec.attribute("oiio:UnassociatedAlpha", 1);
     AtomicFile file(path);
     auto output = OIIO::ImageOutput::create(file.temporary().string());
-    if (!output) throw ImageError(path, "has an extension that no image format answers to");
+    if (!output) throw ImageError(path, "cannot be written: " + OIIO::geterror());
     const auto pixel = OIIO::stride_t(memory_type.size()) * spec.nchannels;
     if (!output->open(file.temporary().string(), spec) ||
         !output->write_image(memory_type, top_row, pixel, row_stride) || !output->close())
@@ -69,6 +69,15 @@ OIIO::TypeDesc file_type(PixelType type) {
         case PixelType::float32: return OIIO::TypeFloat;
     }
     throw std::invalid_argument("unknown pixel type");
+}
+
+/// The formats that are written are those the project uses; each of them is tested, row order included.
+PixelType usual_pixel_type(const fs::path& path) {
+    const std::string extension = OIIO::Strutil::lower(path.extension().string());
+    if (extension == ".exr") return PixelType::half;
+    if (extension == ".tif" || extension == ".tiff") return PixelType::float32;
+    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return PixelType::uint8;
+    throw ImageError(path, "cannot be written: the extensions .exr, .tif, .tiff, .png, .jpg and .jpeg are allowed");
 }
 
 /// Eight bits per channel, row 0 at the top, three channels: what a contact sheet is made of.
@@ -96,13 +105,6 @@ Picture read_picture(const fs::path& path) {
 ImageError::ImageError(const fs::path& path, const std::string& what)
     : std::runtime_error(path.string() + ": " + one_line(what)) {}
 
-PixelType usual_pixel_type(const fs::path& path) {
-    const std::string extension = OIIO::Strutil::lower(path.extension().string());
-    if (extension == ".exr") return PixelType::half;
-    if (extension == ".tif" || extension == ".tiff") return PixelType::float32;
-    return PixelType::uint8;
-}
-
 Image read_image(const fs::path& path) {
     const auto input = open_checked(path);
     const OIIO::ImageSpec& spec = input->spec();
@@ -113,8 +115,9 @@ Image read_image(const fs::path& path) {
     return image;
 }
 
-void write_image(const fs::path& path, const ImageView& image, PixelType type) {
-    const OIIO::ImageSpec spec(image.width, image.height, image.channels, file_type(type));
+void write_image(const fs::path& path, const ImageView& image, std::optional<PixelType> type) {
+    const PixelType usual = usual_pixel_type(path);
+    const OIIO::ImageSpec spec(image.width, image.height, image.channels, file_type(type.value_or(usual)));
     const std::size_t row = std::size_t(image.width) * std::size_t(image.channels);
     write_pixels(path, spec, OIIO::TypeFloat, image.pixels.data() + row * std::size_t(image.height - 1),
                  -OIIO::stride_t(row * sizeof(float)));
