@@ -7,43 +7,53 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
 from ..domain.blood import BLOOD_CONTROL
 from ..domain.errors import InputError, nearest
-from ..domain.head import REGIONS, build_head
+from ..domain.effects.regions import FACE_REGIONS
 from ..domain.plan import Plan
 from ..domain.shot import Image, Pose, Shot, Subject
 from .controls import CONTROLS, set_controls
-from .head import add_head
+from .face import add_face
 from .skin import apply_skin
-from .stage import add_portrait_stage
+from .stage import LIGHTS, set_stage
 
 
 class BlenderRenderer:
     """Implements `app.batch.Renderer`."""
 
+    _rig: bpy.types.Object
+
     def regions(self, subject: Subject) -> tuple[str, ...]:
-        return REGIONS
+        return FACE_REGIONS
 
     def prepare(self, shot: Shot, subject: Subject, plan: Plan) -> None:
         with quiet():
             bpy.ops.wm.read_factory_settings(use_empty=True)
             scene = bpy.context.scene
-            head = add_head(build_head(subject.rig.head))
-            add_portrait_stage(head, shot, scene)
-            apply_skin(head.skin, head.armature, plan)
+            face = add_face(subject.rig.head)
+            set_stage(
+                scene,
+                **face.stage_landmarks,
+                size=(shot.image.width, shot.image.height),
+                lens_mm=shot.camera.focal_mm,
+                turn_deg=shot.camera.yaw_degrees,
+                lights=tuple(replace(light, power=light.power * shot.light.strength) for light in LIGHTS),
+            )
             set_image(scene, shot.image)
-        self._armature = head.armature
+            apply_skin(face.skin, face.rig, plan)
+        self._rig = face.rig
 
     def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:
         scene = bpy.context.scene
         scene.frame_set(frame)
         values = dict.fromkeys(CONTROLS, 0.0)
         values |= pose.emotions | pose.action_units | {BLOOD_CONTROL: pose.blood}
-        set_controls(self._armature, values)
+        set_controls(self._rig, values)
         with quiet():
             bpy.ops.render.render()
             save_render(scene, png, "PNG")

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..app.maps import Surface
-from ..domain.blood import ANATOMY
+from ..domain.effects.regions import FACE_REGIONS
 from ..domain.errors import InputError
 
 GROUP_PREFIX = "sanguine_"
@@ -30,8 +30,8 @@ def store_regions(obj: bpy.types.Object, regions: Mapping[str, np.ndarray]) -> N
 
 
 def face_regions(obj: bpy.types.Object) -> tuple[str, ...]:
-    """Regions that the mesh has masks for, in the order of the anatomy table."""
-    return tuple(region for region in ANATOMY if GROUP_PREFIX + region in obj.vertex_groups)
+    """Regions that the mesh has masks for, in the order in which maps pack them."""
+    return tuple(region for region in FACE_REGIONS if GROUP_PREFIX + region in obj.vertex_groups)
 
 
 def store_rest(obj: bpy.types.Object) -> None:

@@ -10,7 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from ..domain.errors import InputError
 
@@ -32,8 +32,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
+class _Parser(argparse.ArgumentParser):
+    """A wrong flag is bad input like any other: one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="sanguine", description="Physiologically based skin for Blender.")
+    parser = _Parser(prog="sanguine", description="Physiologically based skin for Blender.")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
 
@@ -84,10 +91,10 @@ def _skin(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace) -> int:
     from ..app.planning import plan_report
-    from ..domain.head import REGIONS
+    from ..domain.effects.regions import FACE_REGIONS
     from ..domain.shot import read_shot
 
-    _answer(plan_report(read_shot(options.shot), REGIONS), options.out)
+    _answer(plan_report(read_shot(options.shot), FACE_REGIONS), options.out)
     return 0
 
 

@@ -12,9 +12,10 @@ from .effects import Frame, Scene
 from .errors import InputError, nearest
 from .facs import ACTION_UNITS, EMOTIONS
 from .files import read_toml, validate
-from .head import HEADS
+from .head import load_presets
 from .parameters import skin_from
 from .plan import check_strengths
+from .resources import rigs_path
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _MAX_IMAGES = 100_000  # per shot; a study of thousands fits, a typing error in a frame range does not
@@ -43,8 +44,9 @@ class Rig(_Table):
     @pydantic.field_validator("head")
     @classmethod
     def _known(cls, value: str) -> str:
-        if value not in HEADS:
-            raise ValueError(f"no such head, {nearest(value, HEADS)}")
+        known = load_presets(rigs_path("heads.toml"))
+        if value not in known:
+            raise ValueError(f"no such head, {nearest(value, known)}")
         return value
 
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..blood import ANATOMY
 from .effect import Scene, ShaderInput
+
+FACE_REGIONS = tuple(ANATOMY)
+"""Every region a face can have masks for, in the order in which masks are packed."""
 
 MASKS_PER_IMAGE = 3
 

@@ -1,0 +1,46 @@
+"""The example head as a whole: its objects, its region masks as vertex groups, its sliders and their drivers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+import sanguine_core
+
+from ..domain.head import build_head, load_presets, load_regions
+from ..domain.resources import rigs_path
+from .controls import add_controls, drive_shape_keys
+from .head import build_face
+from .surface import store_regions
+
+
+@dataclass(frozen=True)
+class Face:
+    """skin: the mesh that takes the material. rig: the armature with the controls."""
+
+    skin: bpy.types.Object
+    rig: bpy.types.Object
+    landmarks: dict[str, tuple[float, float, float]]
+
+    @property
+    def stage_landmarks(self) -> dict[str, tuple[float, float, float]]:
+        """What `stage.set_stage` frames the head by."""
+        return {name: self.landmarks[name] for name in ("eyes", "chin", "crown")}
+
+
+def add_face(head_id: str) -> Face:
+    """Builds a head of `rigs/heads.toml` in the open scene. Raises HeadError when its package is not installed."""
+    preset = load_presets(rigs_path("heads.toml"))[head_id]
+    head = build_head(preset, load_regions(rigs_path("regions.toml")), _read_top_down)
+    objects = build_face(head, preset, bpy.data.materials.new("skin"))
+    store_regions(objects.skin, head.regions)
+    add_controls(objects.rig)
+    drive_shape_keys(objects.rig, objects.parts.values())
+    landmarks = {name: tuple(float(x) for x in place) for name, place in head.landmarks.items()}
+    return Face(objects.skin, objects.rig, landmarks)
+
+
+def _read_top_down(path: Path) -> np.ndarray:
+    return sanguine_core.read_image(str(path))[::-1]

@@ -1,0 +1,77 @@
+"""A small scene to measure a material in: linear pixels of a flat patch under light that is known."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from sanguine.blender.render import quiet, save_render
+
+
+def empty_scene(width: int, height: int, samples: int) -> bpy.types.Scene:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.shading_system = True
+    scene.cycles.samples = samples
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 64
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.resolution_percentage = 100
+    return scene
+
+
+def white_world(scene: bpy.types.Scene) -> None:
+    world = bpy.data.worlds.new("white")
+    scene.world = world
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+
+
+def plane(material: bpy.types.Material, half_mm: float = 100.0) -> bpy.types.Object:
+    half = half_mm / 1000.0
+    mesh = bpy.data.meshes.new("patch")
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    patch = bpy.data.objects.new("patch", mesh)
+    bpy.context.scene.collection.objects.link(patch)
+    mesh.materials.append(material)
+    return patch
+
+
+def camera_above(width_mm: float, tilt: float = 0.0) -> None:
+    """An orthographic camera that sees `width_mm` across, tilted from straight down by `tilt` radians."""
+    data = bpy.data.cameras.new("camera")
+    data.type = "ORTHO"
+    data.ortho_scale = width_mm / 1000.0
+    camera = bpy.data.objects.new("camera", data)
+    camera.location = (0.5 * math.sin(tilt), 0.0, 0.5 * math.cos(tilt))
+    camera.rotation_euler = (0.0, tilt, 0.0)
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+
+
+def render_linear() -> np.ndarray:
+    """(H, W, 3) linear pixels of the scene, row 0 lowest."""
+    scene = bpy.context.scene
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pixels.exr"
+        with quiet():
+            bpy.ops.render.render()
+        save_render(scene, path, "OPEN_EXR")
+        return read_linear(path)
+
+
+def read_linear(path: Path) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    try:
+        width, height = image.size
+        pixels = np.empty(width * height * 4, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)[..., :3].astype(np.float64)
