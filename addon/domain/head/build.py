@@ -148,9 +148,13 @@ def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageRea
     package = package or HeadPackage()
     base = package.base_mesh()
     vertices, units = shaped(package, base, preset)
+    bust = bust_.cut_bust(base)
+    # The bust stands on the ground, its neck over the origin.
+    neck = vertices[base.vertices_of("joint-neck")].mean(axis=0)
+    stand = np.array([0, neck[1], vertices[bust.source, 2].min()], np.float32)
+    vertices -= stand
     rng = np.random.default_rng(zlib.crc32(preset.id.encode()))  # the same head every time
 
-    bust = bust_.cut_bust(base)
     skin_vertices = vertices[bust.source] + bust_.round_edge(bust, base)
     skin_units = units[:, bust.source]
     skin = MeshPart(
@@ -178,6 +182,7 @@ def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageRea
         _lashes_part(preset, base, vertices, units, rng),
         _brows_part(preset, base, fine_base, fine_skin, refine.faces, fine_units, rng),
     )
+    landmarks["neck"] = neck - stand
     for name, place in LANDMARKS.items():
         nearest = np.linalg.norm(base.vertices[bust.source] - np.array(place), axis=1).argmin()
         landmarks[name] = skin_vertices[nearest]

@@ -12,7 +12,7 @@ IRIS_RADIUS_M = 0.0060  # horizontal visible iris diameter 11.7 +- 0.5 mm (Rufer
 IRIS_DEPTH_M = 0.0009
 CORNEA_BULGE_M = 0.0013  # height of the cornea (radius 7.8 mm) above the globe at the apex
 FILM_M = 0.00006  # the shell floats this far off the sclera
-GAZE_M = 1.5  # the eyes converge on a point this far in front: the portrait camera
+GAZE_M = 1.0  # the eyes converge on a point this far in front: the portrait camera
 
 SEGMENTS = 48
 

@@ -73,7 +73,7 @@ class Head:
         return next(part for part in self.parts if part.name == name)
 
 
-def shape_keys(names: list[str], dense: np.ndarray, threshold_m: float = 1e-6) -> dict[str, ShapeKey]:
+def shape_keys(names: list[str], dense: np.ndarray, threshold_m: float = 1e-5) -> dict[str, ShapeKey]:
     """Dense displacements (units, V, 3) -> only the keys, and in them only the vertices, that move."""
     moved = (np.abs(dense) > threshold_m).any(axis=-1)
     rows = [np.nonzero(m)[0].astype(np.int32) for m in moved]
