@@ -18,6 +18,7 @@ from sanguine.domain.blood import (
 )
 from sanguine.domain.errors import InputError
 from sanguine.domain.facs import EMOTION_CONTROLS
+from sanguine.domain.head import load_regions
 from sanguine.domain.resources import rigs_path
 
 mixes = st.fixed_dictionaries({name: st.floats(0.0, 1.0) for name in EMOTION_CONTROLS})
@@ -80,6 +81,10 @@ def test_no_emotion_no_change_and_no_channel_without_a_change():
     assert all(blood_change({}, region) == (0.0, 0.0) for region in ANATOMY)
     assert all(c.response.low < 0.0 or c.response.high > 0.0 for c in BLOOD_CHANNELS.values())
     assert blood_bounds({"anger": 1.0}, 1.0, "eyelids", "melanin") == (0.0, 0.0)
+
+
+def test_every_region_of_the_head_has_its_anatomy():
+    assert {region.id for region in load_regions(rigs_path("regions.toml"))} == set(ANATOMY)
 
 
 def test_the_resting_face_follows_anatomy():

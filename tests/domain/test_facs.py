@@ -97,7 +97,7 @@ def test_a_broken_unit_table_says_what_to_mend(tmp_path, old, new, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("{ 6 = 0.9", "{ 666 = 0.9", "emotion.happy.units: 666: no such action unit"),
+        ("{ 6 = 1.0", "{ 666 = 1.0", "emotion.happy.units: 666: no such action unit"),
         ('source = ["emfacs"]', 'source = ["emfac"]', "emotion.neutral.source: emfac: no such row of [sources], did you mean 'emfacs'?"),
     ],
 )  # fmt: skip
