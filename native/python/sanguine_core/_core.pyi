@@ -1,0 +1,86 @@
+"""
+Sanguine's native core. Units stand in the names: mm, per_mm, nm; fractions are 0 to 1.
+"""
+
+from collections.abc import Mapping, Sequence
+import os
+from typing import Annotated
+
+import numpy
+from numpy.typing import NDArray
+
+
+class ImageError(OSError):
+    pass
+
+def rasterize_uv(uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], width: int, height: int, padding_px: int, fill: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int = 0) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]:
+    """
+    Draw per-corner values into the UV layout of a mesh.
+
+    Parameters
+    ----------
+    uv : (L, 2) float32, one per corner (loop); (0, 0) to (1, 1) is the image
+    triangles : (T, 3) int32, indices of corners
+    values : (L, C) float32
+    width, height : pixels, 1 to 16384
+    padding_px : how far values reach beyond the mesh, over seams and borders
+    fill : (C,) float32, for all other pixels
+    threads : 0 uses every core; the result does not depend on it
+
+    Returns
+    -------
+    (height, width, C) float32; row 0 is the bottom row (V = 0), as in Blender's images.
+
+    Notes
+    -----
+    Triangles without area are skipped (`count_degenerate_uv` counts them), those outside the unit square clipped.
+    """
+
+def count_degenerate_uv(uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> int:
+    """
+    How many triangles have no area in UV space, or a coordinate that is not finite.
+    """
+
+def read_image(path: str | os.PathLike) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]:
+    """
+    Read a picture as (H, W, C) float32, row 0 at the bottom, values as stored (8 bits divided by 255).
+
+    Raises ImageError (an OSError) that names the file.
+    """
+
+def write_image(path: str | os.PathLike, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], pixel_type: str | None = None) -> None:
+    """
+    Write (H, W, C) float32, row 0 at the bottom, as EXR, TIFF, PNG or JPEG (by the file name's extension).
+
+    `pixel_type` is "uint8", "uint16", "half" or "float"; None takes half for EXR, float for TIFF and uint8 for others.
+    Values are not colour managed. The file appears whole or not at all. Raises ImageError (an OSError).
+    """
+
+def write_exr_map(path: str | os.PathLike, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], channels: Sequence[str], attributes: Mapping[str, str], half: bool = True) -> None:
+    """
+    Write a chromophore map: scanline EXR with one named channel per column of `pixels`.
+
+    Parameters
+    ----------
+    path : the file appears whole or not at all
+    pixels : (H, W, C) float32, row 0 at the bottom, finite
+    channels : C different names
+    attributes : strings for the header (units, schema version)
+    half : 16-bit floats; False keeps 32 bits
+
+    Raises ImageError (an OSError), or ValueError for names or values that do not fit.
+    """
+
+def read_exr_map(path: str | os.PathLike) -> tuple[Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))], list[str], dict[str, str]]:
+    """
+    Read a chromophore map: (pixels, channel names, string attributes).
+
+    Channels come in the file's order, which is alphabetical in every EXR. Raises ImageError (an OSError).
+    """
+
+def contact_sheet(paths: Sequence[str | os.PathLike], captions: Sequence[str], out_path: str | os.PathLike, columns: int = 5, gap_px: int = 8, background: float = 0.10000000149011612) -> None:
+    """
+    Set pictures side by side with a caption below each (none if `captions` is empty).
+
+    8-bit values are copied unchanged. `background` is 0 to 1 in the pictures' encoding. Raises ImageError.
+    """
