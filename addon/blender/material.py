@@ -50,7 +50,7 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
     build = _Builder(name, tree, plan, maps)
     tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
     chromophores, surface = assemble(plan)
-    points = build.script("chromophores", chromophores)
+    build.points = points = build.script("chromophores", chromophores)
     lobes = build.script("surface", surface)
     build.base_values(points)
     unit_per_mm = 1.0 / (_MM_PER_M * bpy.context.scene.unit_settings.scale_length)
@@ -60,8 +60,6 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
     else:
         for socket, value in zip(lobe_sockets(), table.image.reshape(QUANTITIES, 3), strict=True):
             lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
-    if "film" in points.outputs:
-        build.link(points.outputs["film"], lobes.inputs["film"])
     if "height_mm" in points.outputs:
         bump = build.node("ShaderNodeBump")
         bump.inputs["Distance"].default_value = unit_per_mm
@@ -75,6 +73,8 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
 
 class _Builder:
     """Nodes of one group, each source of a value made once."""
+
+    points: bpy.types.Node  # the first script, once it is made
 
     def __init__(self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, np.ndarray]) -> None:
         self.name, self.tree, self.plan = name, tree, plan
@@ -138,6 +138,9 @@ class _Builder:
         node.attribute_type = kind
         node.attribute_name = key
         return node
+
+    def _from_chromophores(self, key: str) -> bpy.types.NodeSocket:
+        return self.points.outputs[key]
 
     def _from_map(self, key: str) -> bpy.types.NodeSocket:
         node = self.node("ShaderNodeTexImage")

@@ -58,7 +58,7 @@ class ShaderInput:
 
     source: "parameter" (a schema id, a slider of the node group), "strength" (the effect's own slider),
     "object" (a custom property of the object), "vertex" (an attribute of the mesh), "map" (a packed image,
-    "map:alpha" its alpha channel).
+    "map:alpha" its alpha channel), "chromophores" (an output of the first shader, for inputs of the second).
     """
 
     name: str

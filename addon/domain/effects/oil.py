@@ -1,5 +1,7 @@
 """The oil film: a Torrance-Sparrow reflection above the skin; what it reflects does not enter."""
 
+import sanguine_core
+
 from .effect import Activation, Effect, Fragment, Scene, ShaderInput
 
 
@@ -14,7 +16,11 @@ def _fragment(_scene: Scene) -> Fragment:
     return Fragment(
         stage="surface",
         file="oil.osl",
-        inputs=(ShaderInput("roughness", "float", "parameter", "roughness"),),
+        inputs=(
+            ShaderInput("film", "float", "chromophores", "film"),
+            ShaderInput("roughness", "float", "parameter", "roughness"),
+        ),
+        defines={"FILM_IOR": f"{sanguine_core.film_ior()}"},
     )
 
 

@@ -1,0 +1,105 @@
+"""Blood alone: shape frozen at neutral, what each emotion does to the colour of the cheeks."""
+
+import bpy
+import colour
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+from sanguine.blender.controls import CONTROLS, remove_shape_key_drivers, set_controls
+from sanguine.blender.face import add_face
+from sanguine.blender.skin import apply_skin
+from sanguine.blender.stage import set_stage
+from sanguine.domain.blood import blood_change
+from sanguine.domain.effects import Frame, Scene
+from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.parameters import default_skin
+from sanguine.domain.plan import check_strengths, make_plan
+from support.patch import empty_scene, render_linear, white_world
+
+D65 = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+WIDTH, HEIGHT = 160, 200
+CHEEK_PX = 5  # half the side of the mask on each cheek
+EMOTIONS = ("anger", "happy", "sad", "fear")
+
+
+def white_patch(beside):
+    """A white Lambertian card next to the face, so that colours are relative to it."""
+    mesh = bpy.data.meshes.new("white")
+    x, y, z = beside
+    corners = [(x - 0.02, z - 0.02), (x + 0.02, z - 0.02), (x + 0.02, z + 0.02), (x - 0.02, z + 0.02)]
+    mesh.from_pydata([(cx, y, cz) for cx, cz in corners], [], [(0, 1, 2, 3)])
+    card = bpy.data.objects.new("white", mesh)
+    bpy.context.scene.collection.objects.link(card)
+    material = bpy.data.materials.new("white")
+    material.use_nodes = True
+    material.node_tree.nodes.clear()
+    diffuse = material.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    mesh.materials.append(material)
+    return Vector(beside)
+
+
+def pixel(place):
+    at = world_to_camera_view(bpy.context.scene, bpy.context.scene.camera, Vector(place))
+    return int(at.x * WIDTH), int(at.y * HEIGHT)
+
+
+def cheeks_lab(melanin):
+    """Lab of both cheeks relative to the white patch: neutral and each emotion, the head not moving."""
+    scene = empty_scene(WIDTH, HEIGHT, 192)
+    face = add_face("female")
+    set_stage(scene, **face.stage_landmarks, size=(WIDTH, HEIGHT), lights=())
+    white_world(scene)
+    skin = default_skin() | {"melanin": melanin, "oil": 0.0}
+    frames = (Frame("neutral"), *(Frame(name, {name: 1.0}) for name in EMOTIONS))
+    plan = make_plan(Scene(skin, frames, check_strengths({}, "test"), FACE_REGIONS))
+    apply_skin(face.skin, face.rig, plan)
+    remove_shape_key_drivers(face.rig, bpy.data.objects)
+    eyes = face.landmarks["eyes"]
+    card = white_patch((eyes[0] + 0.12, eyes[1], eyes[2] + 0.08))
+    bpy.context.view_layer.update()
+    found = {}
+    for name in ("neutral", *EMOTIONS):
+        set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0) | {"blood": 1.0} | ({name: 1.0} if name in EMOTIONS else {}))
+        image = render_linear()
+        cx, cy = pixel(card)
+        white = image[cy - 2 : cy + 3, cx - 2 : cx + 3].mean((0, 1))
+        assert np.all(white > 0.5), "the white patch is not where it is looked for"
+        cheeks = []
+        for side in ("cheek_left", "cheek_right"):
+            x, y = pixel(face.landmarks[side])
+            cheeks.append(image[y - CHEEK_PX : y + CHEEK_PX + 1, x - CHEEK_PX : x + CHEEK_PX + 1].mean((0, 1)))
+        rgb = np.mean(cheeks, axis=0) / white
+        found[name] = colour.XYZ_to_Lab(colour.RGB_to_XYZ(rgb, "sRGB"), D65)
+    return found
+
+
+@pytest.fixture(scope="module")
+def light():
+    return cheeks_lab(0.018)
+
+
+@pytest.fixture(scope="module")
+def dark():
+    return cheeks_lab(0.25)
+
+
+def test_light_skin(light):
+    """The issue's bars: anger reddens the cheeks by 2 a* or more, fear pales them by 1 or more, joy reddens."""
+    for name in EMOTIONS:
+        change = light[name] - light["neutral"]
+        hemoglobin, oxygenation = blood_change({name: 1.0}, "cheeks")
+        print(f"{name}: hemoglobin {hemoglobin:+.4f}, oxygenation {oxygenation:+.3f} -> dL*a*b* {np.round(change, 2)}")
+    redder = {name: light[name][1] - light["neutral"][1] for name in EMOTIONS}
+    assert redder["anger"] >= 2.0
+    assert redder["fear"] <= -1.0
+    assert redder["happy"] > 0.5
+    assert redder["sad"] < 0.0
+
+
+def test_dark_skin_changes_less(light, dark):
+    for name in ("anger", "fear"):
+        assert abs(dark[name][1] - dark["neutral"][1]) < abs(light[name][1] - light["neutral"][1])
