@@ -54,11 +54,13 @@ def render_batch(
     The plan is that of the whole shot even with `only`: one frame alone equals the same frame in sequence.
     """
     folder = Path(out)
-    kept = _finished(folder) if resume else {}
-    files = dict(kept)
+    wanted = [job for job in jobs(shot) if only is None or job.id in only]
+    whole = _finished(folder) if resume or only is not None else {}
+    kept = whole if resume else {}
+    # With `only`, what an earlier run made of the other images stays in the manifest.
+    files = {name: row for name, row in whole.items() if resume or Path(name).stem not in {job.id for job in wanted}}
     # Written before the work as well as after each image: an unwritable folder is found at once.
     _write_manifest(folder, shot_path, files)
-    wanted = [job for job in jobs(shot) if only is None or job.id in only]
     done = 0
     for subject in shot.subjects:
         mine = [job for job in wanted if job.subject == subject.id]
