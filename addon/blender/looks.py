@@ -82,7 +82,7 @@ def eye(name: str, preset: Preset) -> bpy.types.Material:
     crypt = n.step(0.5, 0.68, n.noise(polar, 3.4, 2.0), out=(1.0, 0.6))
     wobble = n.math("ADD", r, n.math("MULTIPLY_ADD", n.noise(direction, 5.0), 0.24, -0.12))
     stroma = n.mix(n.step(preset.eyes.pupil, 0.74, wobble), preset.eyes.collarette, preset.eyes.iris)
-    shade = n.math("MULTIPLY", n.math("MULTIPLY", fibre, crypt), n.step(0.76, 1.0, r, out=(1.0, 0.16)))
+    shade = n.math("MULTIPLY", n.math("MULTIPLY", fibre, crypt), n.step(0.80, 1.02, r, out=(1.0, 0.25)))
     iris = n.mix(1.0, stroma, n.add("ShaderNodeCombineColor", shade, shade, shade), "MULTIPLY")
     iris = n.mix(n.step(preset.eyes.pupil - 0.03, preset.eyes.pupil + 0.03, r), (0.001, 0.001, 0.001), iris)
 
@@ -90,7 +90,7 @@ def eye(name: str, preset: Preset) -> bpy.types.Material:
     swirl = n.add("ShaderNodeVectorMath", polar, n.noise(polar, 1.6, 2.0), settings={"operation": "ADD"})
     ridge = n.math("ABSOLUTE", n.math("SUBTRACT", n.noise(swirl, 2.3, 4.0, 0.55), 0.5))
     vessel = n.math("MULTIPLY", n.step(0.0, 0.018, ridge, out=(0.5, 0.0)), n.step(1.15, 2.4, r))
-    white = n.mix(n.step(1.2, 3.0, r), (0.60, 0.555, 0.51), (0.52, 0.36, 0.31))
+    white = n.mix(n.step(1.2, 3.0, r), (0.70, 0.66, 0.61), (0.60, 0.40, 0.35))
     white = n.mix(vessel, white, (0.42, 0.10, 0.075))
     color = n.mix(n.step(0.93, 1.09, r), iris, white)
     return n.principled(Base_Color=color, Roughness=0.55, Specular_IOR_Level=0.1)

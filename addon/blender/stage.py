@@ -23,13 +23,14 @@ class Light:
     size: float
     power: float
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    mirrored: bool = True  # seen in the eyes and in highlights
 
 
-# Key from the side and above, so that cheekbone, nose and lips turn in the light; a broad weak fill; a rim that
+# Key from the side and above, so that cheekbone, nose and lips turn in the light; a broad weak fill that leaves one catchlight in the eye; a rim that
 # parts the head from the dark. Neutral white: what colour the skin has is the skin's own.
 LIGHTS = (
     Light("key", -42, 32, 1.1, 0.45, 17.0),
-    Light("fill", 55, 5, 1.4, 1.0, 4.0),
+    Light("fill", 55, 5, 1.4, 1.0, 4.0, mirrored=False),
     Light("rim", 140, 30, 1.2, 0.5, 6.0),
     Light("rim_low", -150, 25, 1.2, 0.5, 3.0),
 )
@@ -96,6 +97,7 @@ def set_stage(
         data.shape, data.size, data.energy, data.color = "DISK", light.size, light.power, light.color
         obj = bpy.data.objects.new(light.name, data)
         a, e = math.radians(light.azimuth), math.radians(light.elevation)
+        obj.visible_glossy = light.mirrored
         obj.location = middle + light.distance * Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
         _aim(obj, Vector((0, eyes_.y, eyes_.z - 0.03)))
         scene.collection.objects.link(obj)

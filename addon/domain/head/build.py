@@ -15,9 +15,10 @@ from .model import Head, MeshPart, shape_keys
 from .package import ARKIT_NAMES, LICENCE, BaseMesh, HeadError, HeadPackage
 from .presets import Preset, load_presets
 from .regions import ImageReader, Region, load_regions, region_weights
-from .surface import Binding, Subdivision, unit, vertex_normals
+from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
 
 NAMES = list(ARKIT_NAMES)
+TEAR_RADIUS_M = 0.00035  # the meniscus of tears is 0.2 to 0.5 mm high
 
 # Landmarks as points of the unshaped base mesh (metres, left side); the nearest skin vertex carries them.
 LANDMARKS = {
@@ -49,9 +50,10 @@ def shaped(package: HeadPackage, base: BaseMesh, preset: Preset) -> tuple[np.nda
     return vertices, units
 
 
-def _eyes_part(base: BaseMesh, vertices: np.ndarray, units: np.ndarray) -> tuple[MeshPart, dict[str, np.ndarray]]:
-    pieces, moved, landmarks, offset = [], [], {}, 0
-    fits = {}
+def _eyes_part(
+    base: BaseMesh, vertices: np.ndarray, units: np.ndarray
+) -> tuple[MeshPart, dict[str, tuple[np.ndarray, float]]]:
+    pieces, moved, fits, offset = [], [], {}, 0
     for side, group in (("left", "helper-l-eye"), ("right", "helper-r-eye")):
         guide = base.vertices_of(group)
         ball = vertices[guide]
@@ -59,16 +61,15 @@ def _eyes_part(base: BaseMesh, vertices: np.ndarray, units: np.ndarray) -> tuple
         fits[side] = guide, *eyes_.fit_sphere(ball[ball[:, 1] > np.quantile(ball[:, 1], 0.25)])
     middle = (fits["left"][1] + fits["right"][1]) / 2
     target = middle - np.array([0, eyes_.GAZE_M, 0], np.float32)
-    for side, (guide, centre, radius) in fits.items():
+    for guide, centre, radius in fits.values():
         v, f, uv, material = eyes_.eyeball(centre, radius - eyes_.FILM_M, target)
         moved.append(eyes_.carried(v, vertices[guide], units[:, guide]))
         pieces.append((v, f + offset, uv, material))
         offset += len(v)
-        landmarks[f"eye_{side}"] = centre
     v, f, uv, material = (np.concatenate(column) for column in zip(*pieces))
     keys = shape_keys(NAMES, np.concatenate(moved, axis=1))
-    landmarks["eyes"] = middle
-    return MeshPart("eyes", v, f.astype(np.int32), uv.astype(np.float32), material, eyes_.SLOTS, keys), landmarks
+    part = MeshPart("eyes", v, f.astype(np.int32), uv.astype(np.float32), material, eyes_.SLOTS, keys)
+    return part, {side: (centre, radius) for side, (_, centre, radius) in fits.items()}
 
 
 def _teeth_part(base: BaseMesh, vertices: np.ndarray, units: np.ndarray) -> MeshPart:
@@ -109,18 +110,21 @@ def _move(binding: Binding, units: np.ndarray) -> np.ndarray:
 
 
 def _lashes_part(preset: Preset, base: BaseMesh, vertices: np.ndarray, units: np.ndarray, rng: np.random.Generator) -> MeshPart:
-    spines, lengths, moved = [], [], []
+    spines, moved, is_upper = [], [], []
     for side in "lr":
         eye = base.vertices[base.vertices_of(f"helper-{side}-eye")].mean(axis=0)
-        for group, count, reach in ((2, 120, 1.0), (1, 64, 0.75)):
+        for group, count, reach in ((2, 130, 2.3), (1, 60, 1.3)):
             card = base.groups[f"helper-{side}-eyelashes-{group}"].faces
-            binding, length = strands.lash_binding(card, eye, base.vertices, count, reach, rng)
+            binding = strands.lash_binding(card, eye, base.vertices, count, reach, rng)
             spines.append(binding(vertices).reshape(count, -1, 3))
-            lengths.append(length)
             moved.append(_move(binding, units))
-    spine = np.concatenate(spines)
+            is_upper.append(np.full(count, group == 2))
+    spine, upper = np.concatenate(spines), np.concatenate(is_upper)
     taper = np.interp(np.linspace(0, 1, spine.shape[1]), [0, 0.5, 1], [1, 0.8, 0.15])
-    radius = np.concatenate(lengths)[:, None] ** 0.5 * taper * preset.lash_radius_mm * 1e-3
+    radius = rng.uniform(0.75, 1.15, (len(spine), 1)) * taper * preset.lash_radius_mm * 1e-3
+    # The upper lashes curl up, the lower a little down.
+    curl = np.linspace(0, 1, spine.shape[1]) ** 2 * 1.4e-3
+    spine[:, :, 2] += np.where(upper, 1.0, -0.4)[:, None] * curl
     normal = np.broadcast_to(np.array([0, 0, 1.0]), spine.shape)
     return _hair_part("lashes", spine, normal, radius, np.concatenate(moved, axis=1))
 
@@ -141,6 +145,22 @@ def _brows_part(
     taper = np.interp(np.linspace(0, 1, spine.shape[1]), [0, 0.6, 1], [0.9, 0.75, 0.12])
     radius = preset.brows.radius_mm * 1e-3 * taper * rng.uniform(0.75, 1.15, (len(spine), 1))
     return _hair_part("brows", spine, np.concatenate(up), radius, np.concatenate(moved, axis=1))
+
+
+def _tear_part(eyes: dict[str, tuple[np.ndarray, float]], fine: np.ndarray, edges: np.ndarray, units: np.ndarray) -> MeshPart:
+    """The meniscus along both lids: a thread of water that closes the edge between lid and globe."""
+    pieces, moved, offset = [], [], 0
+    for centre, radius in eyes.values():
+        binding = strands.tear_binding(fine, edges, centre, radius)
+        spine = binding(fine)[None]
+        v, f, owner = strands.tubes(spine, spine - centre, np.full(spine.shape[:2], TEAR_RADIUS_M), sides=8)
+        pieces.append((v, f + offset))
+        moved.append(_move(binding, units)[:, owner])
+        offset += len(v)
+    v, f = (np.concatenate(column) for column in zip(*pieces))
+    uv = np.zeros((*f.shape, 2), np.float32)
+    keys = shape_keys(NAMES, np.concatenate(moved, axis=1))
+    return MeshPart("tears", v, f, uv, np.zeros(len(f), np.int32), ("cornea",), keys)
 
 
 def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageReader, package: HeadPackage | None = None) -> Head:
@@ -169,7 +189,9 @@ def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageRea
     fine_base, fine_skin = fine[:, :3], fine[:, 3:6]
     fine_units = np.moveaxis(fine[:, 6:].reshape(len(fine), len(NAMES), 3), 1, 0)
 
-    eyes, landmarks = _eyes_part(base, vertices, units)
+    eyes, globes = _eyes_part(base, vertices, units)
+    landmarks = {f"eye_{side}": centre for side, (centre, _) in globes.items()}
+    landmarks["eyes"] = (landmarks["eye_left"] + landmarks["eye_right"]) / 2
     eyes_base = np.concatenate([base.vertices[base.vertices_of(f"helper-{s}-eye")] for s in "lr"]).mean(axis=0)
     ears = weights.get("ears", np.zeros(len(skin_vertices), np.float32))
     scalp = hair_.scalp_mask(preset.hair, base.vertices[bust.source], ears, eyes_base).astype(np.float32)
@@ -177,6 +199,7 @@ def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageRea
     parts = (
         skin,
         eyes,
+        _tear_part(globes, fine_skin, edges_of(refine.faces)[0], fine_units),
         _teeth_part(base, vertices, units),
         _tongue_part(base, vertices, units),
         _lashes_part(preset, base, vertices, units, rng),

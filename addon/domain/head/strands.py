@@ -25,24 +25,26 @@ BROW = np.array(
 BROW_LEAN = np.array([[0.0, 78, 62], [0.12, 60, 38], [0.3, 42, 12], [0.6, 22, -14], [1.0, 6, -8]])
 
 
-def tubes(spine: np.ndarray, offset_from: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def tubes(
+    spine: np.ndarray, offset_from: np.ndarray, radius: np.ndarray, sides: int = SIDES
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tubes around strands: spine (N, K, 3), a direction off the strand (N, K, 3), radius (N, K).
 
-    Returns vertices (N*K*SIDES, 3), quads, and for each vertex its row in the flattened spine, by which any
+    Returns vertices (N*K*sides, 3), quads, and for each vertex its row in the flattened spine, by which any
     displacement of the spine becomes one of the tube.
     """
     n, k, _ = spine.shape
     tangent = unit(np.gradient(spine, axis=1))
     side = unit(np.cross(tangent, offset_from))
     up = np.cross(side, tangent)
-    turn = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.cos(turn)[:, None] * side[:, :, None] + np.sin(turn)[:, None] * up[:, :, None]
     vertices = spine[:, :, None] + radius[:, :, None, None] * ring
-    here = np.arange(SIDES)
+    here = np.arange(sides)
     there = np.roll(here, -1)
-    row = (np.arange(n)[:, None, None] * k + np.arange(k - 1)[:, None]) * SIDES
-    quads = np.stack([row + here, row + there, row + SIDES + there, row + SIDES + here], axis=-1)
-    owner = np.repeat(np.arange(n * k), SIDES)
+    row = (np.arange(n)[:, None, None] * k + np.arange(k - 1)[:, None]) * sides
+    quads = np.stack([row + here, row + there, row + sides + there, row + sides + here], axis=-1)
+    owner = np.repeat(np.arange(n * k), sides)
     return vertices.reshape(-1, 3).astype(np.float32), quads.reshape(-1, 4).astype(np.int32), owner
 
 
@@ -55,18 +57,18 @@ def brow_binding(
     eye         : middle of this eye on the unshaped mesh
     """
     n = brows.count
-    # As many hairs per area everywhere: where the brow is higher, there are more; the tail is a little denser.
+    # As many hairs per area everywhere: where the brow is higher, there are more; the inner end is sparse, the tail dense.
     fine = np.linspace(0, 1, 201)
-    share = np.interp(fine, BROW[:, 0], BROW[:, 3] ** 0.8)
+    share = np.interp(fine, BROW[:, 0], BROW[:, 3] * [0.45, 0.9, 1, 1.1, 1.3, 1.3])
     t = np.interp(rng.random(n), np.cumsum(share) / share.sum(), fine)
-    across = rng.uniform(-1, 1, n) * rng.uniform(0.55, 1, n) ** 0.5
+    across = np.clip(rng.normal(0, 0.6, n), -1.35, 1.35)  # thinner toward the rims, with a few strays
     line = [np.interp(t, BROW[:, 0], BROW[:, c]) for c in (1, 2, 3)]
     x, z, half = line[0], line[1] + brows.lift_mm, line[2] * brows.thickness
     slope = np.interp(t, BROW[:, 0], np.degrees(np.arctan2(np.gradient(BROW[:, 2]), np.gradient(BROW[:, 1]))))
     low, high = (np.interp(t, BROW_LEAN[:, 0], BROW_LEAN[:, c]) for c in (1, 2))
-    lean = np.radians(slope + low + (high - low) * (across + 1) / 2 + rng.normal(0, 7, n))
+    lean = np.radians(slope + low + (high - low) * (across + 1) / 2 + rng.normal(0, 11, n))
     bend = np.radians(rng.normal(-16, 8, n)) * np.where(t < 0.5, 1, 0.6)  # tips turn outward
-    length = brows.length_mm * np.interp(t, [0, 0.15, 0.6, 1], [0.7, 1, 0.95, 0.6]) * rng.uniform(0.6, 1.08, n)
+    length = brows.length_mm * np.interp(t, [0, 0.2, 0.6, 1], [0.6, 1, 0.95, 0.6]) * rng.uniform(0.5, 1.1, n)
     s = np.linspace(0, 1, points)
     angle = lean[:, None] + bend[:, None] * s
     step = length[:, None] / (points - 1)
@@ -102,8 +104,8 @@ def grid_of(faces: np.ndarray) -> np.ndarray:
 
 def lash_binding(
     card: np.ndarray, eye: np.ndarray, base: np.ndarray, count: int, reach: float, rng: np.random.Generator, points: int = 6
-) -> tuple[Binding, np.ndarray]:
-    """Single lashes laid in the base mesh's lash card (quads): binding of count*points rows, and length factor (count,)."""
+) -> Binding:
+    """Single lashes laid in the base mesh's lash card (quads), up to `reach` times as long: count*points rows."""
     grid = grid_of(card)
     if grid.shape[0] > grid.shape[1]:
         grid = grid.T
@@ -111,17 +113,38 @@ def lash_binding(
     if from_eye[0] > from_eye[-1]:
         grid = grid[::-1]
     rows, columns = grid.shape
-    # Lashes stand in loose tufts whose tips meet.
-    s0 = np.sort(rng.uniform(0.02, 0.98, count))
+    # Lashes stand in loose tufts whose tips meet. They grow past the card's tip, straight on (row fraction above 1).
+    s0 = np.sort(rng.uniform(0.07, 0.93, count))
     tuft = np.round(s0 * 16 + rng.normal(0, 0.25, count)) / 16
     length = reach * rng.uniform(0.65, 1.0, count) * (0.7 + 0.3 * np.sin(np.pi * s0))
     v = np.linspace(0, 1, points)
     along = s0[:, None] + (tuft - s0)[:, None] * 0.45 * v**1.5 + rng.normal(0, 0.012, count)[:, None] * v
     out = length[:, None] * v
     column = np.clip(along * (columns - 1), 0, columns - 1.001).ravel()
-    row = np.clip(out * (rows - 1), 0, rows - 1.001).ravel()
-    c, r = column.astype(int), row.astype(int)
+    row = (out * (rows - 1)).ravel()
+    c, r = column.astype(int), np.minimum(row.astype(int), rows - 2)
     fc, fr = column - c, row - r
     index = np.stack([grid[r, c], grid[r, c + 1], grid[r + 1, c], grid[r + 1, c + 1]], axis=-1)
     weight = np.stack([(1 - fr) * (1 - fc), (1 - fr) * fc, fr * (1 - fc), fr * fc], axis=-1)
-    return Binding(index, weight), length
+    return Binding(index, weight)
+
+
+def tear_binding(vertices: np.ndarray, edges: np.ndarray, centre: np.ndarray, globe_m: float, points: int = 60) -> Binding:
+    """The line where the lids touch the globe, as a closed loop of `points` bound to skin edges (two weights each).
+
+    vertices, edges : the refined skin. An edge that passes through the globe's surface gives one point; in each of
+    `points` directions about the optical axis the foremost is taken, the visible one.
+    """
+    near = (np.linalg.norm(vertices - centre, axis=1) < globe_m * 1.35) & (vertices[:, 1] < centre[1] - globe_m * 0.2)
+    edges = edges[near[edges].all(axis=1)]
+    distance = np.linalg.norm(vertices - centre, axis=1) - globe_m
+    a, b = distance[edges].T
+    edges, a, b = (column[a * b < 0] for column in (edges, a, b))
+    weight = np.stack([b, -a], axis=-1) / (b - a)[:, None]
+    place = np.einsum("nk,nkc->nc", weight, vertices[edges]) - centre
+    angle = np.arctan2(place[:, 2] * 2.2, place[:, 0])  # the opening is about 2.2 times as wide as high
+    bin_ = ((angle + np.pi) / (2 * np.pi) * points).astype(int) % points
+    order = np.lexsort((place[:, 1], bin_))
+    first = order[np.unique(bin_[order], return_index=True)[1]]
+    loop = np.r_[first, first[:1]]
+    return Binding(edges[loop], weight[loop])
