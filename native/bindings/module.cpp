@@ -9,8 +9,6 @@ void bind_texture(nb::module_& m);
 NB_MODULE(_core, m) {
     m.doc() = "Sanguine's native core. Units stand in the names: mm, per_mm, nm; fractions are 0 to 1.";
     m.attr("__version__") = SANGUINE_VERSION;
-#ifdef SANGUINE_WITH_OPTICS
     bind_optics(m);
-#endif
     bind_texture(m);
 }

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from site import getsitepackages as site_packages
 
 import pytest
 
@@ -45,12 +46,21 @@ def archive(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def run_in_blender(tmp_path_factory):
-    """Run a script in a new Blender whose user folder is empty at first and shared by the session."""
+    """Run a script in a new Blender that shares one user folder, empty at first, with the session's others.
+
+    The interpreter sees Blender and the head data, and nothing else of this environment: what the add-on imports
+    has to come out of the zip.
+    """
     user = tmp_path_factory.mktemp("blender_user")
+    site = tmp_path_factory.mktemp("site")
+    for name in ("bpy", "numpy", "numpy.libs", "anny"):
+        for folder in map(Path, site_packages()):
+            if (folder / name).exists():
+                (site / name).symlink_to(folder / name)
 
     def run(script: str, *arguments: str) -> str:
-        environment = dict(os.environ, BLENDER_USER_RESOURCES=str(user))
-        command = [sys.executable, "-c", script, *arguments]
+        environment = dict(os.environ, BLENDER_USER_RESOURCES=str(user), PYTHONPATH=str(site))
+        command = [sys.executable, "-S", "-c", script, *arguments]  # -S: without this environment's packages
         result = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=user)
         assert result.returncode == 0, result.stdout + result.stderr
         return result.stdout

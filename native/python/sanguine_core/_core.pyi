@@ -2,13 +2,88 @@
 Sanguine's native core. Units stand in the names: mm, per_mm, nm; fractions are 0 to 1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import os
 from typing import Annotated
 
 import numpy
 from numpy.typing import NDArray
 
+
+class Cancelled(Exception):
+    pass
+
+SKIN_INDEX: float = 1.4
+
+OIL_FILM_INDEX: float = 1.5
+
+def parameters() -> list:
+    """
+    Rows of the schema as dicts; their order is the column order of every (N, P) array.
+    """
+
+def derived_parameters() -> list:
+    """Views of stored parameters, which can be set in their place."""
+
+def optical_coefficients(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> dict:
+    """
+    Absorption and reduced scattering of both layers [1/mm].
+
+    skins: (N, P), columns in the order of parameters(); wavelengths_nm: (W,) within 380 to 780.
+    Returns a dict of (N, W) arrays. Source: Donner and Jensen 2006.
+    """
+
+def reflectance(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int = 0, progress: Callable | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """
+    Diffuse reflectance (N, W) of bare skin per unit of Lambertian light that falls on it.
+
+    The reflection of the surface is not in it, see surface(). `oil` plays no part.
+    progress(done, total) is called on this thread a few times a second; False raises Cancelled.
+    """
+
+def surface(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """
+    What the surface reflects of Lambertian light, (N, 2): the oil film alone, and film and skin interface together.
+
+    Under the film the skin's reflectance is (1 - film) * reflectance().
+    """
+
+def default_radii_mm() -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+    """Logarithmic radii from 0.001 to 40 mm for radial_profile()."""
+
+def radial_profile(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], radius_mm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int = 0, progress: Callable | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None))]:
+    """
+    R(r) [1/mm^2], (N, W, R), for Lambertian light on one point; its plane integral is reflectance().
+    """
+
+def xyz(spectra: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """
+    XYZ (N, 3) of reflectance spectra (N, W): D65, CIE 1931 2 degrees, Y = 100 for white.
+    """
+
+def lab(xyz: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """CIE L*a*b* (N, 3) of XYZ (Y = 100 for white) under D65."""
+
+def linear_rgb(xyz: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], working_space: str | Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)] = 'rec709') -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """
+    Linear RGB (N, 3), signed, of XYZ (Y = 100 for white); perfect white is (1, 1, 1).
+
+    working_space: 'rec709', 'rec2020', 'acescg', or a (3, 3) matrix from XYZ (D65, Y = 1) to RGB.
+    """
+
+def burley_lobes(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], working_space: str | Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)] = 'rec709', lobe_count: int = 4, threads: int = 0, progress: Callable | None = None) -> dict:
+    """
+    Profiles in RGB as non-negative lobes (exp(-r/d) + exp(-r/(3d))) / (8 pi d r), widest first.
+
+    Returns a dict: weights (N, K, 3), adding up to rgb where that is positive; d_mm (N, K, 3);
+    clamped (N, 3), share of the profile that is negative; fit_error (N, 3), L1 error over the plane per
+    reflectance; rgb (N, 3), the reflectance. Cycles' radius is 4 pi d.
+    """
+
+def counters() -> dict:
+    """Work done since the last reset_counters()."""
+
+def reset_counters() -> None: ...
 
 class ImageError(OSError):
     pass
