@@ -31,8 +31,8 @@ class Light:
 LIGHTS = (
     Light("key", -42, 32, 1.1, 0.45, 17.0),
     Light("fill", 55, 5, 1.4, 1.0, 4.0, mirrored=False),
-    Light("rim", 140, 30, 1.2, 0.5, 6.0),
-    Light("rim_low", -150, 25, 1.2, 0.5, 3.0),
+    Light("rim", 140, 30, 1.2, 0.5, 3.0),
+    Light("rim_low", -150, 25, 1.2, 0.5, 2.0),
 )
 
 

@@ -20,7 +20,7 @@ def _fragment(_scene: Scene) -> Fragment:
             ShaderInput("film", "float", "chromophores", "film"),
             ShaderInput("roughness", "float", "parameter", "roughness"),
         ),
-        defines={"FILM_IOR": f"{sanguine_core.film_ior()}"},
+        defines={"FILM_IOR": f"{sanguine_core.OIL_FILM_INDEX}"},
     )
 
 

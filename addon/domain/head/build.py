@@ -113,7 +113,7 @@ def _lashes_part(preset: Preset, base: BaseMesh, vertices: np.ndarray, units: np
     spines, moved, is_upper = [], [], []
     for side in "lr":
         eye = base.vertices[base.vertices_of(f"helper-{side}-eye")].mean(axis=0)
-        for group, count, reach in ((2, 130, 2.3), (1, 60, 1.3)):
+        for group, count, reach in ((2, 130, 1.9), (1, 60, 1.0)):
             card = base.groups[f"helper-{side}-eyelashes-{group}"].faces
             binding = strands.lash_binding(card, eye, base.vertices, count, reach, rng)
             spines.append(binding(vertices).reshape(count, -1, 3))

@@ -14,8 +14,10 @@ LOWER_WIDTHS_MM = (5.2, 5.8, 6.9, 7.0, 7.1, 11.0, 10.5)
 UPPER_HEIGHTS_MM = (10.4, 9.3, 10.2, 8.6, 8.2, 7.5, 7.0)
 LOWER_HEIGHTS_MM = (8.8, 9.2, 10.4, 8.6, 8.0, 7.5, 7.0)
 THICKNESS_MM = (4.6, 4.4, 5.6, 7.6, 7.8, 9.2, 9.0)
-OVERBITE_MM = 1.6  # upper edges reach this far below the lower ones
-OVERJET_MM = 2.6  # lower arch lies this far inside the upper one
+SHOW_MM = 1.2  # upper edges reach this far below the guide, to show between parted lips
+OVERBITE_MM = 1.6  # and this far below the lower edges
+OVERJET_MM = 2.4  # lower arch lies this far inside the upper one
+FORWARD_MM = 2.2
 
 
 def _crown(width: float, height: float, thickness: float, cut: float) -> tuple[np.ndarray, np.ndarray]:
@@ -51,14 +53,14 @@ def dental_arch(band: np.ndarray, upper: bool) -> tuple[np.ndarray, np.ndarray, 
     """Teeth and gum of one jaw, from its helper band (G, 3): vertices, quads, material (0 tooth, 1 gum)."""
     mm = 1e-3
     widths, heights = (UPPER_WIDTHS_MM, UPPER_HEIGHTS_MM) if upper else (LOWER_WIDTHS_MM, LOWER_HEIGHTS_MM)
-    inset = (0.8 if upper else 0.8 + OVERJET_MM * 0.4) * mm
-    edge = band[:, 2].min() if upper else band[:, 2].max()
+    # The bands are thin guides inside the mouth; the crowns' lip side stands a little in front, just behind the lips.
+    inset = (-FORWARD_MM if upper else OVERJET_MM - FORWARD_MM) * mm
     front, back = band[:, 1].min() + inset, band[:, 1].max()
     half_width = np.abs(band[:, 0]).max() - inset
     # The bands rise to the back (curve of Spee); the slope is that of the band's middle line.
     slope = np.polyfit(band[:, 1], band[:, 2], 1)[0]
-    rim = band[np.argsort(band[:, 1])[:6], 2]
-    edge = (rim.min() - 0.2 * mm) if upper else rim.max() - OVERBITE_MM * mm
+    incisal = band[np.abs(band[:, 0]) < 10 * mm, 2]
+    edge = incisal.min() - SHOW_MM * mm if upper else incisal.max() + (OVERBITE_MM - SHOW_MM) * mm
     toward_gum = 1.0 if upper else -1.0
     arch, arc = _arch(half_width, front, back)
 
