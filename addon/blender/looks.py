@@ -127,7 +127,7 @@ def _hair(name: str, melanin: float, redness: float) -> bpy.types.Material:
     shader = n.add(
         "ShaderNodeBsdfHairPrincipled",
         settings={"parametrization": "MELANIN"},
-        **{"Melanin": melanin, "Melanin Redness": redness, "Roughness": 0.35, "Radial Roughness": 0.5, "Random Color": 0.12},
+        **{"Melanin": melanin, "Melanin Redness": redness, "Roughness": 0.42, "Radial Roughness": 0.6, "Random Color": 0.15},
     )
     return n.surface(shader)
 
@@ -138,7 +138,7 @@ def looks(preset: Preset) -> dict[str, bpy.types.Material]:
     return {
         "eye": eye(name("eye"), preset),
         "cornea": cornea(name("cornea")),
-        "teeth": _wet(name("teeth"), (0.60, 0.53, 0.43), 0.3, (1.0, 0.8, 0.6), 0.001),
+        "teeth": _wet(name("teeth"), (0.72, 0.65, 0.54), 0.3, (1.0, 0.8, 0.6), 0.001),
         "gum": _wet(name("gum"), (0.42, 0.13, 0.12)),
         "tongue": _wet(name("tongue"), (0.40, 0.13, 0.12), 0.4),
         "mouth": _wet(name("mouth"), (0.30, 0.07, 0.06)),

@@ -22,7 +22,9 @@ def scalp_mask(hair: Hair, base: np.ndarray, ears: np.ndarray, eyes: np.ndarray)
     rel = (base - eyes) * 1000
     azimuth = np.degrees(np.arctan2(np.abs(rel[:, 0]), AXIS_BEHIND_EYES_MM - rel[:, 1]))
     above = rel[:, 2] - np.interp(azimuth, line[:, 0], line[:, 1])
-    return smoothstep(-5, 9, above) * (1 - smoothstep(0.02, 0.2, ears))
+    # The line is never a line: it wanders by a few millimetres and thins out over a centimetre.
+    wander = 2.5 * np.sin(rel @ [0.31, 0.17, 0.07]) + 1.5 * np.sin(rel @ [-0.43, 0.38, 0.61])
+    return smoothstep(-6, 10, above + wander) * (1 - smoothstep(0.02, 0.2, ears))
 
 
 class SkullRadius:
@@ -57,8 +59,8 @@ def _crop(hair: Hair, root: np.ndarray, normal: np.ndarray, eyes: np.ndarray, rn
     along = unit(along - (along * normal).sum(axis=1, keepdims=True) * normal)
     height = (root[:, 2] - eyes[2]) * 1000
     top = smoothstep(25, 95, height)
-    length = hair.length_mm * 1e-3 * (0.35 + 0.65 * top) * rng.uniform(0.75, 1.05, n)
-    rise = np.radians(24 + 26 * top + rng.normal(0, 7, n))
+    length = hair.length_mm * 1e-3 * (0.3 + 0.7 * top) * rng.uniform(0.6, 1.1, n)
+    rise = np.radians(22 + 30 * top + rng.normal(0, 10, n))
     s = np.linspace(0, 1, 6)
     reach = length[:, None] * s
     out = np.sin(rise)[:, None] * reach * (1 - 0.38 * s) - (reach * np.cos(rise)[:, None]) ** 2 / 0.2

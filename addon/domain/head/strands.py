@@ -59,7 +59,7 @@ def brow_binding(
     n = brows.count
     # As many hairs per area everywhere: where the brow is higher, there are more; the inner end is sparse, the tail dense.
     fine = np.linspace(0, 1, 201)
-    share = np.interp(fine, BROW[:, 0], BROW[:, 3] * [0.45, 0.9, 1, 1.1, 1.3, 1.3])
+    share = np.interp(fine, BROW[:, 0], BROW[:, 3] * [0.7, 1, 1, 1.1, 1.3, 1.3])
     t = np.interp(rng.random(n), np.cumsum(share) / share.sum(), fine)
     across = np.clip(rng.normal(0, 0.6, n), -1.35, 1.35)  # thinner toward the rims, with a few strays
     line = [np.interp(t, BROW[:, 0], BROW[:, c]) for c in (1, 2, 3)]
