@@ -269,7 +269,7 @@ void bind_optics(nb::module_& m) {
     m.def("surface", &py_surface, "skins"_a,
           "What the surface reflects of Lambertian light, (N, 2): the oil film alone, and film and skin interface together.\n\n"
           "Under the film the skin's reflectance is (1 - film) * reflectance().");
-    m.def("default_radii_mm", &py_default_radii_mm, "Logarithmic radii from 0.001 to 40 mm for radial_profile().");
+    m.def("default_radii_mm", &py_default_radii_mm, "Logarithmic radii from 0.0005 to 40 mm for radial_profile(); the disk inside the first holds 2 pi r^2 R(r).");
     m.def("radial_profile", &py_radial_profile, "skins"_a, "wavelengths_nm"_a, "radius_mm"_a, "threads"_a = 0,
           "progress"_a = nb::none(),
           "R(r) [1/mm^2], (N, W, R), for Lambertian light on one point; its plane integral is reflectance().");

@@ -19,6 +19,7 @@ constexpr double stiffness = 3e-4;
 constexpr int iterations = 12;
 constexpr double difference = 1e-3;  // of ln d, for derivatives
 constexpr double max_step = 0.5;     // of ln d
+constexpr double converged = 1e-3;   // of ln d: a step below this is the last
 
 using Vector = std::array<double, max_lobes>;
 using Matrix = std::array<std::array<double, max_lobes + 1>, max_lobes + 1>;
@@ -88,7 +89,9 @@ public:
                 break;
 
             Vector trial = log_d;
+            double largest = 0;
             for (int k = 0; k < count_; ++k) {
+                largest = std::fmax(largest, std::fabs(step[k]));
                 trial[k] += std::clamp(step[k], -max_step, max_step);
                 set_lobe(k, trial[k]);
             }
@@ -103,6 +106,8 @@ public:
                     set_lobe(k, log_d[k]);
                 damping *= 5;
             }
+            if (largest < converged)
+                break;
         }
         evaluate(residual_);  // leaves the weights of the widths that are returned
         return log_d;

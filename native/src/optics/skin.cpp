@@ -86,10 +86,11 @@ void solve_profiles(std::span<const SkinParameters> skins, std::span<const doubl
 }
 
 std::vector<double> default_radii_mm() {
-    constexpr int count = 107;  // a tenth apart
+    constexpr int count = 114;  // a tenth apart
+    constexpr double first = 0.0005, last = 40;
     std::vector<double> radii;
     for (int k = 0; k < count; ++k)
-        radii.push_back(0.001 * std::pow(40 / 0.001, k / (count - 1.0)));
+        radii.push_back(first * std::pow(last / first, k / (count - 1.0)));
     return radii;
 }
 
