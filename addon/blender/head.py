@@ -61,10 +61,6 @@ def _add_shape_keys(obj: bpy.types.Object, part: MeshPart) -> None:
         block.data.foreach_set("co", position.ravel())
 
 
-def _add_attribute(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
-    mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", values.astype(np.float32))
-
-
 def _curves(name: str, strands: StrandPart) -> bpy.types.Curves:
     curves = bpy.data.hair_curves.new(name)
     n, k, _ = strands.points.shape
@@ -150,8 +146,8 @@ def build_face(head: Head, preset: Preset, skin_material: bpy.types.Material, sc
         if part.subdivision:
             modifier = obj.modifiers.new("Subdivision", "SUBSURF")
             modifier.levels, modifier.render_levels = 1, part.subdivision
-    for name, weights in {**{f"region_{k}": v for k, v in head.regions.items()}, "scalp": head.scalp}.items():
-        _add_attribute(objects["skin"].data, name, weights)
+    scalp = objects["skin"].data.attributes.new("scalp", "FLOAT", "POINT")
+    scalp.data.foreach_set("value", head.scalp)
     name = f"{head.preset}_{head.hair.name}"
     hair = bpy.data.objects.new(name, _curves(name, head.hair))
     hair.data.materials.append(materials[head.hair.slot])

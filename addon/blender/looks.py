@@ -119,7 +119,7 @@ def _wet(name: str, color: RGB, roughness: float = 0.25, radius: RGB = (1.0, 0.3
 
 
 def _fibre(name: str, color: RGB) -> bpy.types.Material:
-    return Nodes(name).principled(Base_Color=color, Roughness=0.45, Specular_IOR_Level=0.35)
+    return Nodes(name).principled(Base_Color=color, Roughness=0.5, Specular_IOR_Level=0.12)
 
 
 def _hair(name: str, melanin: float, redness: float) -> bpy.types.Material:
@@ -127,7 +127,7 @@ def _hair(name: str, melanin: float, redness: float) -> bpy.types.Material:
     shader = n.add(
         "ShaderNodeBsdfHairPrincipled",
         settings={"parametrization": "MELANIN"},
-        **{"Melanin": melanin, "Melanin Redness": redness, "Roughness": 0.42, "Radial Roughness": 0.6, "Random Color": 0.15},
+        **{"Melanin": melanin, "Melanin Redness": redness, "Roughness": 0.42, "Radial Roughness": 0.6, "Random Color": 0.15, "IOR": 1.38},
     )
     return n.surface(shader)
 

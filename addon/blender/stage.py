@@ -29,8 +29,8 @@ class Light:
 # Key from the side and above, so that cheekbone, nose and lips turn in the light; a broad weak fill that leaves one catchlight in the eye; a rim that
 # parts the head from the dark. Neutral white: what colour the skin has is the skin's own.
 LIGHTS = (
-    Light("key", -42, 32, 1.1, 0.45, 17.0),
-    Light("fill", 55, 5, 1.4, 1.0, 4.0, mirrored=False),
+    Light("key", -42, 32, 1.1, 0.45, 19.0),
+    Light("fill", 55, 5, 1.4, 1.0, 3.2, mirrored=False),
     Light("rim", 140, 30, 1.2, 0.5, 3.0),
     Light("rim_low", -150, 25, 1.2, 0.5, 2.0),
 )

@@ -1,6 +1,6 @@
 """The head: CC0 base mesh and targets in, parts with ARKit shape keys, hair and region weights out. No bpy."""
 
-from .build import build_head, build_named
+from .build import build_head
 from .model import Head, MeshPart, ShapeKey, StrandPart
 from .package import ARKIT_NAMES, HeadError, HeadPackage
 from .presets import Preset, load_presets
@@ -17,7 +17,6 @@ __all__ = [
     "ShapeKey",
     "StrandPart",
     "build_head",
-    "build_named",
     "load_presets",
     "load_regions",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from . import eyes as eyes_
 from . import hair as hair_
 from . import strands, teeth
 from .model import Head, MeshPart, shape_keys
-from .package import ARKIT_NAMES, LICENCE, BaseMesh, HeadError, HeadPackage
-from .presets import Preset, load_presets
-from .regions import ImageReader, Region, load_regions, region_weights
+from .package import ARKIT_NAMES, LICENCE, BaseMesh, HeadPackage
+from .presets import Preset
+from .regions import ImageReader, Region, region_weights
 from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
 
 NAMES = list(ARKIT_NAMES)
@@ -210,11 +209,3 @@ def build_head(preset: Preset, regions: tuple[Region, ...], read_image: ImageRea
         nearest = np.linalg.norm(base.vertices[bust.source] - np.array(place), axis=1).argmin()
         landmarks[name] = skin_vertices[nearest]
     return Head(parts, hair, weights, scalp, landmarks, preset.id, LICENCE)
-
-
-def build_named(name: str, rigs: Path, read_image: ImageReader, package: HeadPackage | None = None) -> Head:
-    """The head of a preset by its id, with the presets and regions of a `rigs` folder."""
-    presets = load_presets(Path(rigs) / "heads.toml")
-    if name not in presets:
-        raise HeadError(f"heads.toml: no head {name!r}; there are {', '.join(sorted(presets))}")
-    return build_head(presets[name], load_regions(Path(rigs) / "regions.toml"), read_image, package)

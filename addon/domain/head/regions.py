@@ -6,23 +6,24 @@ an earlier region (lips) takes its share first, a later one (chin) gets what is 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
+from ..files import read_toml, validate
+from ..resources import Row
 from .bust import Bust
-from .package import BaseMesh, HeadError, HeadPackage
+from .package import BaseMesh, HeadPackage
 from .surface import ScatterMean, smooth, smoothstep
 
+Radius = Annotated[float, Field(gt=0)]
 ImageReader = Callable[[Path], np.ndarray]  # path -> (H, W) or (H, W, C) float, row 0 on top
 
 
-@dataclass(frozen=True)
-class Region:
+class Region(Row):
     """One region.
 
     mask      : name of a package mask image, or ''
@@ -34,30 +35,24 @@ class Region:
     id: str
     label: str
     help: str
-    mask: str = ""
-    ellipsoids: tuple[tuple[float, ...], ...] = ()
-    core: float = 0.4
-    smooth: int = 0
+    mask: Literal["", "lips", "ears", "eyelids", "face"] = ""
+    ellipsoids: tuple[tuple[float, float, float, Radius, Radius, Radius], ...] = ()
+    core: Annotated[float, Field(ge=0, lt=1)] = 0.4
+    smooth: Annotated[int, Field(ge=0, le=50)] = 0
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> Region:
+        if not (self.mask or self.ellipsoids):
+            raise ValueError("needs a mask or ellipsoids")
+        return self
 
 
 def load_regions(path: Path) -> tuple[Region, ...]:
-    try:
-        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise HeadError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise HeadError(f"{path}: {error}") from None
-    regions = []
-    for name, table in document.items():
-        try:
-            rows: Any = tuple(tuple(map(float, row)) for row in table.pop("ellipsoids", ()))
-            region = Region(id=name, ellipsoids=rows, **table)
-        except (TypeError, ValueError, AttributeError) as error:
-            raise HeadError(f"{Path(path).name}: [{name}]: {error}") from None
-        if any(len(row) != 6 or min(row[3:]) <= 0 for row in rows) or not (rows or region.mask):
-            raise HeadError(f"{Path(path).name}: [{name}]: needs a mask, or ellipsoids of six numbers with radii above 0")
-        regions.append(region)
-    return tuple(regions)
+    """All regions of a regions.toml, in its order. Raises InputError, one line naming file, key and mend."""
+    return tuple(
+        validate(Region, {"id": name, **table} if isinstance(table, dict) else table, f"{path}: [{name}]")
+        for name, table in read_toml(path).items()
+    )
 
 
 def sample(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
