@@ -163,6 +163,19 @@ class HeadPackage:
             row[index] = delta
         return dense
 
+    def mirror(self) -> np.ndarray:
+        """(19158,) the vertex on the other side of the face; its own number on the midline."""
+        path = self.root / "mpfb2/mesh_metadata/hm08.mirror"
+        twin = np.full(N_VERTICES, -1, dtype=np.int64)
+        try:
+            pairs = np.array([line.split()[:2] for line in _read_text(path).splitlines() if line], dtype=np.int64)
+            twin[pairs[:, 0]] = pairs[:, 1]
+        except (ValueError, IndexError) as error:
+            raise HeadError(f"{path.name}: not hm08's table of mirrored vertices ({error}): {MEND}") from None
+        if ((twin < 0) | (twin >= N_VERTICES)).any():
+            raise HeadError(f"{path.name}: a vertex of hm08 has no mirrored one: {MEND}")
+        return twin
+
     def mask_path(self, name: str) -> Path:
         """The UV mask image of a region ('lips', 'ears', 'eyelids', …), in hm08's layout, row 0 at v = 1."""
         path = self.root / f"mpfb2/textures/mpfb_{name}.jpg"

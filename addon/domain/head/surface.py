@@ -27,7 +27,8 @@ class ScatterMean:
 
     def sum(self, rows: np.ndarray) -> np.ndarray:
         out = np.zeros((self.size, *rows.shape[1:]), dtype=rows.dtype)
-        out[self.filled] = np.add.reduceat(rows[self.order], self.start, axis=0)
+        if self.filled.size:
+            out[self.filled] = np.add.reduceat(rows[self.order], self.start, axis=0)
         return out
 
     def mean(self, rows: np.ndarray) -> np.ndarray:
