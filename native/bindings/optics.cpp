@@ -131,7 +131,8 @@ nb::dict py_optical_coefficients(const TableIn& rows, const VectorIn& wavelength
     return result;
 }
 
-ArrayOut<2> py_reflectance(const TableIn& rows, const VectorIn& wavelengths_nm, int threads, const ProgressIn& progress) {
+ArrayOut<2> py_reflectance(const TableIn& rows, const VectorIn& wavelengths_nm, int threads,
+                           const ProgressIn& progress) {
     const std::vector<SkinParameters> skins = skins_from(rows);
     std::vector<double> out;
     {
@@ -157,8 +158,8 @@ ArrayOut<1> py_default_radii_mm() {
     return to_numpy<1>(radii, {radii.size()});
 }
 
-ArrayOut<3> py_radial_profile(const TableIn& rows, const VectorIn& wavelengths_nm, const VectorIn& radius_mm, int threads,
-                              const ProgressIn& progress) {
+ArrayOut<3> py_radial_profile(const TableIn& rows, const VectorIn& wavelengths_nm, const VectorIn& radius_mm,
+                              int threads, const ProgressIn& progress) {
     const std::vector<SkinParameters> skins = skins_from(rows);
     const std::size_t waves = wavelengths_nm.size(), radii = radius_mm.size();
     for (std::size_t r = 0; r < radii; ++r)
@@ -255,7 +256,8 @@ void bind_optics(nb::module_& m) {
     m.attr("SKIN_INDEX") = path_grid::refractive_index;
     m.attr("OIL_FILM_INDEX") = oil_film_index;
 
-    m.def("parameters", &parameters, "Rows of the schema as dicts; their order is the column order of every (N, P) array.");
+    m.def("parameters", &parameters,
+          "Rows of the schema as dicts; their order is the column order of every (N, P) array.");
     m.def("derived_parameters", &derived_parameters, "Views of stored parameters, which can be set in their place.");
 
     m.def("optical_coefficients", &py_optical_coefficients, "skins"_a, "wavelengths_nm"_a,
@@ -267,9 +269,11 @@ void bind_optics(nb::module_& m) {
           "The reflection of the surface is not in it, see surface(). `oil` plays no part.\n"
           "progress(done, total) is called on this thread a few times a second; False raises Cancelled.");
     m.def("surface", &py_surface, "skins"_a,
-          "What the surface reflects of Lambertian light, (N, 2): the oil film alone, and film and skin interface together.\n\n"
+          "Share of Lambertian light that the surface reflects, (N, 2): oil film alone, film and skin together.\n\n"
           "Under the film the skin's reflectance is (1 - film) * reflectance().");
-    m.def("default_radii_mm", &py_default_radii_mm, "Logarithmic radii from 0.0005 to 40 mm for radial_profile(); the disk inside the first holds 2 pi r^2 R(r).");
+    m.def("default_radii_mm", &py_default_radii_mm,
+          "Logarithmic radii from 0.0005 to 40 mm for radial_profile().\n\n"
+          "The disk inside the first one holds 2 pi r^2 R(r): there every profile falls as 1/r.");
     m.def("radial_profile", &py_radial_profile, "skins"_a, "wavelengths_nm"_a, "radius_mm"_a, "threads"_a = 0,
           "progress"_a = nb::none(),
           "R(r) [1/mm^2], (N, W, R), for Lambertian light on one point; its plane integral is reflectance().");

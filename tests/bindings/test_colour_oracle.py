@@ -39,7 +39,8 @@ def test_xyz_and_lab():
     expected = colour.XYZ_to_Lab(oracle_xyz() / 100, white)
     assert np.linalg.norm(core.lab(xyz) - expected, axis=1).max() < 0.05
     # And to the tabulated white of D65, as others will compute it.
-    tabulated = colour.XYZ_to_Lab(oracle_xyz() / 100, colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"])
+    d65 = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    tabulated = colour.XYZ_to_Lab(oracle_xyz() / 100, d65)
     assert np.linalg.norm(core.lab(xyz) - tabulated, axis=1).max() < 0.05
 
 

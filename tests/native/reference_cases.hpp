@@ -1,6 +1,6 @@
-// Independent Monte Carlo answers (double precision, Henyey-Greenstein, Fresnel at every boundary, 14 million photons or
-// more), themselves checked against van de Hulst, Giovanelli and adding-doubling. Cases are named as in the project's
-// reference set `public.json`; units mm and 1/mm.
+// Independent Monte Carlo answers (double precision, Henyey-Greenstein, Fresnel at every boundary, 14 million photons
+// or more), themselves checked against van de Hulst, Giovanelli and adding-doubling. Cases are named as in the
+// project's reference set `public.json`; units mm and 1/mm.
 #pragma once
 
 #include <limits>
@@ -21,18 +21,18 @@ struct Case {
 };
 
 inline const Case cases[] = {
-    {"p02", sanguine::Incidence::normal, {{2.67507, 31.4012, 0.8, 1.4, 0.1}, {0.600805, 15.7006, 0.8, 1.4, half_space}},
-     0.10650271, 4.45e-05, 0, 0},
-    {"p06", sanguine::Incidence::normal, {{0.137249, 4.40428, 0.0, 1.4, 0.1}, {0.0340398, 2.20214, 0.0, 1.4, half_space}},
-     0.52294628, 9.33e-05, 0, 0},
-    {"p09", sanguine::Incidence::normal, {{1.0, 9.0, 0.75, 1.0, 0.2}},
-     0.097383284, 1.6e-05, 0.66096407, 1.86e-05},
-    {"p10", sanguine::Incidence::normal, {{0.1, 10.0, 0.8, 1.4, 0.01}},
-     0.013706325, 4.02e-06, 0.9347882, 6.55e-06},
-    {"p11", sanguine::Incidence::normal, {{10.0, 1.0, 0.0, 1.4, half_space}},
-     0.0060353, 2.36e-06, 0, 0},
-    {"p13", sanguine::Incidence::diffuse, {{2.14443, 28.1214, 0.8, 1.4, 0.06}, {0.583129, 14.0607, 0.8, 1.4, half_space}},
-     0.12990401, 4.78e-05, 0, 0},
+    {"p02", sanguine::Incidence::normal,
+     {{2.67507, 31.4012, 0.8, 1.4, 0.1}, {0.600805, 15.7006, 0.8, 1.4, half_space}}, 0.10650271, 4.45e-05, 0, 0},
+    {"p06", sanguine::Incidence::normal,
+     {{0.137249, 4.40428, 0.0, 1.4, 0.1}, {0.0340398, 2.20214, 0.0, 1.4, half_space}}, 0.52294628, 9.33e-05, 0, 0},
+    {"p09", sanguine::Incidence::normal,
+     {{1.0, 9.0, 0.75, 1.0, 0.2}}, 0.097383284, 1.6e-05, 0.66096407, 1.86e-05},
+    {"p10", sanguine::Incidence::normal,
+     {{0.1, 10.0, 0.8, 1.4, 0.01}}, 0.013706325, 4.02e-06, 0.9347882, 6.55e-06},
+    {"p11", sanguine::Incidence::normal,
+     {{10.0, 1.0, 0.0, 1.4, half_space}}, 0.0060353, 2.36e-06, 0, 0},
+    {"p13", sanguine::Incidence::diffuse,
+     {{2.14443, 28.1214, 0.8, 1.4, 0.06}, {0.583129, 14.0607, 0.8, 1.4, half_space}}, 0.12990401, 4.78e-05, 0, 0},
 };
 
 /// Energy of case p13 in rings between `inner` and `outer` [mm], per incident photon.

@@ -79,7 +79,7 @@ TEST(Chromophores, MelaninAndBaseline) {
 }
 
 TEST(Chromophores, ScatteringIsInPerMillimetre) {
-    // Within 5 % of measured epidermis, Salomatina et al. 2006: 7.06, 5.84, 4.27 1/mm. Read as 1/cm it would be a tenth.
+    // Within 5 % of measured epidermis, Salomatina et al. 2006: 7.06, 5.84, 4.27 1/mm. Read as 1/cm: a tenth.
     EXPECT_NEAR(chromophores_at(500).epidermis_scattering / 7.06, 1, 0.05);
     EXPECT_NEAR(chromophores_at(550).epidermis_scattering / 5.84, 1, 0.05);
     EXPECT_NEAR(chromophores_at(700).epidermis_scattering / 4.27, 1, 0.05);

@@ -37,10 +37,9 @@ TEST(Colour, WhiteIsD65) {
 }
 
 TEST(Colour, WhiteIsOneInEveryWorkingSpace) {
-    const Colour white = white_xyz();
+    const Colour white = white_xyz(), relative = {white[0] / 100, white[1] / 100, white[2] / 100};
     for (const char* space : {"rec709", "rec2020", "acescg"})
-        EXPECT_LT(distance(rgb_from_xyz(space) * Colour{white[0] / 100, white[1] / 100, white[2] / 100}, {1, 1, 1}), 1e-12)
-            << space;
+        EXPECT_LT(distance(rgb_from_xyz(space) * relative, {1, 1, 1}), 1e-12) << space;
     EXPECT_THROW(rgb_from_xyz("sRGB"), std::invalid_argument);
 }
 
@@ -54,8 +53,8 @@ TEST(Colour, Rec709MatrixIsTheStandardOne) {
 }
 
 TEST(Colour, CoarseSpectraAreInterpolated) {
-    // A spectrum as curved as skin's hemoglobin bands. Every 10 nm costs less than 0.05 in Lab; a sum that only weighs its
-    // samples would be off by more than 0.5.
+    // A spectrum as curved as skin's hemoglobin bands. Every 10 nm costs less than 0.05 in Lab; a sum that only weighs
+    // its samples would be off by more than 0.5.
     const auto skin = [](double nm) {
         return 0.2 + 0.3 / (1 + std::exp((600 - nm) / 15)) - 0.05 * std::exp(-std::pow((nm - 542) / 12, 2));
     };

@@ -58,7 +58,7 @@ Direct trace(double tau, double a1, double a2, int photons) {
 }
 
 TEST(PathTable, ReferenceCaseUnderDiffuseLight) {
-    // p13: measured difference of the total 0.10 %, of the rings 0.5 % in L1; noise of table and reference is 0.1 % each.
+    // p13: measured difference of the total 0.10 %, of the rings 0.5 % in L1; table and reference have 0.1 % of noise.
     const auto& c = *std::find_if(std::begin(reference::cases), std::end(reference::cases),
                                   [](const auto& x) { return std::string(x.id) == "p13"; });
     const double mu_s_prime = c.layers[0].mu_s * (1 - c.layers[0].g), unit = 1 / mu_s_prime;
@@ -150,9 +150,9 @@ TEST(PathTable, ThinEpidermisTurnsIntoBareDermis) {
 }
 
 TEST(PathTable, ThickEpidermisIsAHalfSpace) {
-    // Bare dermis at tau = 0 is a half-space that scatters half as much: with half the absorption it is the same problem
-    // as an epidermis without end, and 7.5 mean free paths with absorption 0.5 are as good as that. The same random
-    // numbers made both, so that only the bins of path length can differ.
+    // Bare dermis at tau = 0 is a half-space that scatters half as much: with half the absorption it is the same
+    // problem as an epidermis without end, and 7.5 mean free paths with absorption 0.5 are as good as that. The same
+    // random numbers made both, so that only the bins of path length can differ.
     EXPECT_NEAR(table().total(max_thickness, 0.5, 0.25) / table().total(0, 1, 0.25), 1, 0.001);
 }
 

@@ -73,7 +73,8 @@ TEST(Skin, DarkerWithMelaninAndHemoglobin) {
             const std::vector<double> r = reflectance(skins, nm, 0, {});
             for (std::size_t i = 0; i + 1 < skins.size(); ++i)
                 for (std::size_t w = 0; w < nm.size(); ++w)
-                    ASSERT_GT(r[i * nm.size() + w], r[(i + 1) * nm.size() + w]) << i << ' ' << nm[w] << ' ' << thickness;
+                    ASSERT_GT(r[i * nm.size() + w], r[(i + 1) * nm.size() + w])
+                        << i << ' ' << nm[w] << ' ' << thickness;
         }
 }
 

@@ -18,7 +18,7 @@ double burley_energy_within(double r, double d);
 
 /// One channel of a profile as lobes, widest first.
 struct BurleyFit {
-    std::array<double, max_lobes> weight{};  ///< >= 0, adds up to the channel's reflectance; all 0 where that is not positive
+    std::array<double, max_lobes> weight{};  ///< >= 0, adds up to the channel's reflectance; 0 if that is negative
     std::array<double, max_lobes> d_mm{};
     double clamped;    ///< L1 norm of the profile's negative part over the channel's reflectance; 1 without reflectance
     double fit_error;  ///< L1 norm over the plane of lobes minus profile, over the channel's reflectance; 1 likewise
@@ -43,7 +43,7 @@ struct SkinLobes {
 
 /// Solves and fits skins. `rgb` maps XYZ (D65, Y = 1 for white) to RGB. Throws std::invalid_argument for a lobe count
 /// outside 1 to max_lobes.
-std::vector<SkinLobes> skin_lobes(std::span<const SkinParameters> skins, const Matrix3& rgb, int lobe_count, int threads,
-                                  const Progress& progress);
+std::vector<SkinLobes> skin_lobes(std::span<const SkinParameters> skins, const Matrix3& rgb, int lobe_count,
+                                  int threads, const Progress& progress);
 
 }  // namespace sanguine

@@ -17,6 +17,7 @@ struct Cancelled : std::runtime_error {
 
 /// Runs body(i) for every i below `count` on `threads` threads (0: one per core). Rethrows the first exception of a
 /// body, or throws Cancelled, after all threads have ended.
-void parallel_for(std::size_t count, int threads, const Progress& progress, const std::function<void(std::size_t)>& body);
+void parallel_for(std::size_t count, int threads, const Progress& progress,
+                  const std::function<void(std::size_t)>& body);
 
 }  // namespace sanguine

@@ -43,13 +43,17 @@ def reflectance(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None)
 
 def surface(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
     """
-    What the surface reflects of Lambertian light, (N, 2): the oil film alone, and film and skin interface together.
+    Share of Lambertian light that the surface reflects, (N, 2): oil film alone, film and skin together.
 
     Under the film the skin's reflectance is (1 - film) * reflectance().
     """
 
 def default_radii_mm() -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
-    """Logarithmic radii from 0.001 to 40 mm for radial_profile()."""
+    """
+    Logarithmic radii from 0.0005 to 40 mm for radial_profile().
+
+    The disk inside the first one holds 2 pi r^2 R(r): there every profile falls as 1/r.
+    """
 
 def radial_profile(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], radius_mm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int = 0, progress: Callable | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None))]:
     """

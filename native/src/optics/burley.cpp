@@ -254,8 +254,8 @@ BurleyFit fit_burley(std::span<const double> energy, std::span<const double> edg
     return fit;
 }
 
-std::vector<SkinLobes> skin_lobes(std::span<const SkinParameters> skins, const Matrix3& rgb, int lobe_count, int threads,
-                                  const Progress& progress) {
+std::vector<SkinLobes> skin_lobes(std::span<const SkinParameters> skins, const Matrix3& rgb, int lobe_count,
+                                  int threads, const Progress& progress) {
     if (lobe_count < 1 || lobe_count > max_lobes)
         throw std::invalid_argument("lobe_count: " + std::to_string(lobe_count) + " is outside 1 to "
                                     + std::to_string(max_lobes));

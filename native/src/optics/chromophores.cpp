@@ -22,7 +22,8 @@ constexpr double blood_per_extinction = std::numbers::ln10 * hemoglobin_g_per_l 
 Chromophores chromophores_at(double nm) {
     if (!(nm >= min_wavelength_nm && nm <= max_wavelength_nm)) {
         std::ostringstream message;
-        message << "wavelengths_nm: " << nm << " is outside " << min_wavelength_nm << " to " << max_wavelength_nm << " nm";
+        message << "wavelengths_nm: " << nm << " is outside " << min_wavelength_nm << " to "
+                << max_wavelength_nm << " nm";
         throw std::invalid_argument(message.str());
     }
     const auto table = embedded_hemoglobin();
@@ -46,7 +47,8 @@ Chromophores chromophores_at(double nm) {
 
 OpticalCoefficients optical_coefficients(const SkinParameters& skin, const Chromophores& pure) {
     return {
-        skin.melanin * std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend) + (1 - skin.melanin) * pure.baseline,
+        skin.melanin * std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend)
+            + (1 - skin.melanin) * pure.baseline,
         skin.hemoglobin * std::lerp(pure.deoxyhemoglobin, pure.oxyhemoglobin, skin.oxygenation)
             + (1 - skin.hemoglobin) * pure.baseline,
         pure.epidermis_scattering,

@@ -102,8 +102,8 @@ std::vector<Colour> xyz_weights(std::span<const double> nm) {
     for (std::size_t i = 0; i < nm.size(); ++i)
         if (!(nm[i] >= min_wavelength_nm && nm[i] <= max_wavelength_nm) || (i > 0 && nm[i] <= nm[i - 1])) {
             std::ostringstream message;
-            message << "wavelengths_nm: " << nm[i] << " at " << i << ", must increase within " << min_wavelength_nm << " to "
-                    << max_wavelength_nm << " nm";
+            message << "wavelengths_nm: " << nm[i] << " at " << i << ", must increase within "
+                    << min_wavelength_nm << " to " << max_wavelength_nm << " nm";
             throw std::invalid_argument(message.str());
         }
     if (nm.empty())

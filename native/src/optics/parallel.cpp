@@ -14,7 +14,7 @@ namespace sanguine {
 void parallel_for(std::size_t count, int threads, const Progress& progress,
                   const std::function<void(std::size_t)>& body) {
     if (threads < 0)
-        throw std::invalid_argument("threads: " + std::to_string(threads) + " is not allowed, 0 (all cores) or more is");
+        throw std::invalid_argument("threads: " + std::to_string(threads) + " is below 0 (0: all cores)");
     const std::size_t wanted = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
     const std::size_t workers = std::min(count, wanted);
 

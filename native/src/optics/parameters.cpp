@@ -15,8 +15,8 @@ SkinParameters skin_from_row(std::span<const double> values, std::size_t index) 
         const ParameterRow& row = parameter_rows[i];
         if (!(values[i] >= row.hard_min && values[i] <= row.hard_max)) {  // also refuses a NaN
             std::ostringstream message;
-            message << "skin " << index << ": " << row.id << ": " << values[i] << " is outside " << row.hard_min << " to "
-                    << row.hard_max;
+            message << "skin " << index << ": " << row.id << ": " << values[i] << " is outside "
+                    << row.hard_min << " to " << row.hard_max;
             if (row.unit != "1")
                 message << ' ' << row.unit;
             throw std::invalid_argument(message.str());

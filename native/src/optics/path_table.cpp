@@ -81,8 +81,8 @@ private:
 };
 
 /// Interpolates four values of R that belong to the nodes of `stencil`, cubic in ln R. Where one of them saw no
-/// photon there is no smooth logarithm to follow, and R is taken linearly; such rings hold less than a millionth of
-/// the light.
+/// photon there is no smooth logarithm to follow, and R is taken linearly; such rings hold about a millionth
+/// of the light.
 double interpolate(const PathTable::Stencil& stencil, const std::array<double, 4>& value) {
     if (*std::min_element(value.begin(), value.end()) <= 0)
         return std::lerp(value[stencil.lower], value[stencil.lower + 1], stencil.fraction);

@@ -26,7 +26,8 @@ double position_of(double radius) {
 }  // namespace
 
 RadialProfile::RadialProfile(std::span<const double, rings> energy, double unit_mm) : unit_mm_(unit_mm) {
-    // Secants: what a ring holds. Light beyond the last edge (226 units, less than 1e-8) joins the last ring.
+    // Secants: what a ring holds. Light beyond the last edge, 226 units, where no
+    // photon of the present table went, joins the last ring.
     std::array<double, edges - 1> secant;
     std::copy(energy.begin() + 1, energy.begin() + edges, secant.begin());
     secant.back() += energy.back();
