@@ -49,9 +49,9 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
     tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
     build = _Builder(name, tree, plan, maps)
     tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
-    chromophores, surface = assemble(plan)
-    build.points = points = build.script("chromophores", chromophores)
-    lobes = build.script("surface", surface)
+    shaders = assemble(plan)
+    build.points = points = build.script("chromophores", shaders["chromophores"])
+    lobes = build.script("surface", shaders["surface"])
     build.base_values(points)
     unit_per_mm = 1.0 / (_MM_PER_M * bpy.context.scene.unit_settings.scale_length)
     lobes.inputs["unit_per_mm"].default_value = unit_per_mm
@@ -60,10 +60,10 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
     else:
         for socket, value in zip(lobe_sockets(), table.image.reshape(QUANTITIES, 3), strict=True):
             lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
-    if "height_mm" in points.outputs:
+    if "relief" in shaders:
         bump = build.node("ShaderNodeBump")
         bump.inputs["Distance"].default_value = unit_per_mm
-        build.link(points.outputs["height_mm"], bump.inputs["Height"])
+        build.link(build.script("relief", shaders["relief"]).outputs["height_mm"], bump.inputs["Height"])
         build.link(bump.outputs["Normal"], lobes.inputs["Normal"])
     end = build.node("NodeGroupOutput")
     build.link(lobes.outputs["BSDF"], end.inputs["BSDF"])
@@ -179,7 +179,7 @@ class _Builder:
     def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
         """Columns from left to right, so that a person can read the group."""
         points.location, lobes.location, end.location = (0, 0), (900, 0), (1200, 0)
-        columns = {"ShaderNodeAttribute": -600, "ShaderNodeVectorMath": 300, "ShaderNodeBump": 600}
+        columns = {"ShaderNodeAttribute": -600, "ShaderNodeVectorMath": 300, "ShaderNodeBump": 600, "ShaderNodeScript": 300}
         heights: dict[int, int] = {}
         self.begin.location = (-600, 500)
         for node in self.tree.nodes:

@@ -1,8 +1,8 @@
-"""The two OSL shaders of a plan, assembled from `shaders_osl/` and the fragments of the active effects.
+"""The OSL shaders of a plan, assembled from `shaders_osl/` and the fragments of the active effects.
 
-The first (`chromophores.osl`) says what is in the skin at a point and where the table holds it; Image Texture
-nodes read the table; the second (`surface.osl`) turns what they read into closures. What the plan leaves out
-is not in the text: no input, no instruction.
+`chromophores.osl` says what is in the skin at a point and where the table holds it; Image Texture nodes read the
+table; `surface.osl` turns what they read into closures; `relief.osl`, if an effect needs it, bends the normal.
+What the plan leaves out is not in the text: no input, no instruction.
 """
 
 from __future__ import annotations
@@ -24,15 +24,14 @@ class Shader:
     inputs: tuple[ShaderInput, ...]
 
 
-def assemble(plan: Plan) -> tuple[Shader, Shader]:
-    """(chromophores, surface) for `plan`."""
+def assemble(plan: Plan) -> dict[str, Shader]:
+    """Stage -> shader: "chromophores" and "surface", and "relief" when an active effect has a fragment for it."""
     active = {effect.id for effect in plan.active}
     axes = plan.axes
     defines = {
         "AXES": len(axes),
         "TABLE_HEIGHT": float(table_height(axes)),
         "FILM": int("oil" in active),
-        "RELIEF": int("relief" in active),
     }
     for i, axis in enumerate(axes):
         defines |= {
@@ -42,10 +41,13 @@ def assemble(plan: Plan) -> tuple[Shader, Shader]:
             f"AXIS_{i}_COUNT": float(axis.count),
             f"AXIS_{i}_LOG": int(axis.logarithmic),
         }
-    return (
-        _assemble("chromophores", plan.fragments, defines),
-        _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2)}),
-    )
+    shaders = {
+        "chromophores": _assemble("chromophores", plan.fragments, defines),
+        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2)}),
+    }
+    if any(fragment.stage == "relief" for fragment in plan.fragments):
+        shaders["relief"] = _assemble("relief", plan.fragments, {})
+    return shaders
 
 
 def _assemble(stage: str, fragments: tuple[Fragment, ...], defines: Mapping[str, object]) -> Shader:

@@ -69,7 +69,7 @@ def test_no_trace_of_an_inactive_effect(effect):
     others = {item.name for other in plan.fragments if other.file != fragment.file for item in other.inputs}
     without = plan.without(effect.id)
     assert fragment.file not in {f.file for f in without.fragments}
-    text = "".join(shader.source for shader in assemble(without))
+    text = "".join(shader.source for shader in assemble(without).values())
     for name in mine - others:
         declared = re.search(rf"^ +(float|color|vector) {name} = ", text, re.MULTILINE)
         assert not declared, f"{name} is an input though {effect.id} is off"

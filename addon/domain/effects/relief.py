@@ -5,7 +5,7 @@ from .effect import Effect, Fragment, Scene, ShaderInput, strength_activation
 
 def _fragment(_scene: Scene) -> Fragment:
     return Fragment(
-        stage="chromophores",
+        stage="relief",
         file="relief.osl",
         inputs=(
             ShaderInput("rest_mm", "vector", "vertex", "rest_mm"),
