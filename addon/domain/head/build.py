@@ -41,7 +41,7 @@ def shaped(package: HeadPackage, base: BaseMesh, preset: Preset) -> tuple[np.nda
     for name, weight in preset.morphs.items():
         index, delta = package.morph(name)
         vertices[index] += np.float32(weight) * delta
-    units = package.face_units(NAMES)
+    units = package.face_units()
     for name, weight in preset.rest.items():
         unit_ = units[NAMES.index(name)]
         vertices += np.float32(weight) * unit_

@@ -14,8 +14,8 @@ LOWER_WIDTHS_MM = (5.2, 5.8, 6.9, 7.0, 7.1, 11.0, 10.5)
 UPPER_HEIGHTS_MM = (10.4, 9.3, 10.2, 8.6, 8.2, 7.5, 7.0)
 LOWER_HEIGHTS_MM = (8.8, 9.2, 10.4, 8.6, 8.0, 7.5, 7.0)
 THICKNESS_MM = (4.6, 4.4, 5.6, 7.6, 7.8, 9.2, 9.0)
-SHOW_MM = 2.4  # upper edges reach this far below the guide, to show between parted lips
-OVERBITE_MM = 2.2  # and this far below the lower edges
+SHOW_MM = 4.0  # upper edges reach this far below the guide, to show between parted lips
+OVERBITE_MM = 2.4  # and this far below the lower edges
 OVERJET_MM = 2.4  # lower arch lies this far inside the upper one
 FORWARD_MM = 2.2
 
