@@ -69,6 +69,9 @@ def add_controls(armature: bpy.types.Object) -> bpy.types.PoseBone:
             bone[name] = control.default
         _describe(bone, name, control.help, 0.0, control.maximum, control.default)
         bone.property_overridable_library_set(f'["{name}"]', True)
+    # A driver that is evaluated before the armature's evaluated copy has this pose is marked invalid for good.
+    armature.update_tag()
+    bpy.context.view_layer.update()
     return bone
 
 

@@ -200,3 +200,19 @@ def test_a_saved_face_answers_to_keys_without_the_add_on(face, tmp_path, how):
     values = [list(map(float, line.split()[1:])) for line in run.stdout.splitlines() if line.startswith("VALUES")]
     change = blood_change({"anger": 1.0}, "cheeks")[0]
     assert values == [pytest.approx([1.0, 0.0, 0.0]), pytest.approx([11.0, 1.0, change])]
+
+
+def test_drivers_work_on_a_face_that_was_seen_before_its_armature():
+    """The scene was evaluated with the face in it, as it always is for an artist, before the controls came."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    skin = add_mesh("skin", ["browDownLeft"])
+    bpy.context.view_layer.update()
+    armature = add_armature()
+    controls.add_controls(armature)
+    controls.drive_shape_keys(armature, [skin])
+    controls.drive_blood(armature, skin, [BLOOD_CHANNELS["cheeks", "hemoglobin"]])
+    bpy.context.view_layer.update()
+    controls.set_controls(armature, {"anger": 1.0})
+    bpy.context.view_layer.update()
+    assert skin["blood_hemoglobin_cheeks"] > 0.0
+    assert skin.data.shape_keys.key_blocks["browDownLeft"].value > 0.5
