@@ -2,6 +2,8 @@
 # Run the Blender tests on other Blender versions, each in an environment of its
 # own (.venv-<version>): tools/matrix.sh 4.2.23 5.0.1 5.2.3
 #
+# TESTS="tests/e2e ..." runs fewer of them.
+#
 # Blender 5.1 and later need Python 3.13. Where the system has none, a Debian 13
 # folder (.cache/trixie) provides it, which needs root and debootstrap.
 set -eu
@@ -46,9 +48,10 @@ in_trixie() {
 run_version() {
     version=$1
     case "$version" in
-        4.* | 5.0.*) base_python=/usr/bin/python3.11 run= ;;
+        4.* | 5.0.*) base_python=/usr/bin/python3.11 run='' numpy='numpy<2' ;;
         *)
-            if base_python=$(find_python_3_13); then run=; else base_python=python3.13 run=in_trixie; fi
+            numpy='numpy>=2'
+            if base_python=$(find_python_3_13); then run=''; else base_python=python3.13 run=in_trixie; fi
             ;;
     esac
     venv=.venv-$version
@@ -57,17 +60,18 @@ run_version() {
     if [ ! -e "$stamp" ]; then
         rm -rf "$venv"
         $run "$base_python" -m venv "$venv"
-        # The pins of the main environment, except bpy and the NumPy that it brings.
+        # The pins of the main environment, except bpy and NumPy: each Blender has its own generation of it.
         grep -hvE '^(bpy|numpy|-r )' tools/requirements-addon.txt tools/requirements-run.txt \
             tools/requirements-test.txt >"$venv/pins.txt"
         grep -hE '^(setuptools|wheel)=' tools/requirements-build.txt >>"$venv/pins.txt"
         $run "$python" -m pip install --quiet --no-deps --requirement "$venv/pins.txt"
-        $run "$python" -m pip install --quiet "bpy==$version"
+        $run "$python" -m pip install --quiet "bpy==$version" "$numpy"
         touch "$stamp"
     fi
     $run "$python" -m pip install --quiet --no-deps --force-reinstall dist/wheels/sanguine_core-*.whl
     $run "$python" -m pip install --quiet --no-deps --no-build-isolation --editable addon
-    $run "$python" -m pytest tests/blender tests/e2e tests/render
+    # shellcheck disable=SC2086 # the folders are separate words on purpose
+    $run "$python" -m pytest ${TESTS:-tests/blender tests/e2e tests/render}
 }
 
 failed=''
