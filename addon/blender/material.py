@@ -20,6 +20,9 @@ from .colour import working_space
 from .images import data_image
 from .osl import script_node
 
+MARK = "sanguine"
+"""Custom property of every skin material: what it simulates."""
+
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
 # Heights come in mm; the Bump node wants the height of "1" in scene units.
 _MM_PER_M = 1000.0
@@ -41,8 +44,21 @@ def build_skin_material(
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     output.location = (300, 0)
     tree.links.new(group.outputs["BSDF"], output.inputs["Surface"])
-    material["sanguine"] = {"effects": [effect.id for effect in plan.active], "entries": plan.entries}
+    material[MARK] = {"effects": [effect.id for effect in plan.active], "entries": plan.entries}
     return material
+
+
+def remove_skin_material(material: bpy.types.Material) -> None:
+    """Removes a material of `build_skin_material` with the group, images and texts that were made for it alone."""
+    groups = [node.node_tree for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup"]
+    bpy.data.materials.remove(material)
+    for group in groups:
+        images = {node.image for node in group.nodes if node.bl_idname == "ShaderNodeTexImage"}
+        texts = {node.script for node in group.nodes if node.bl_idname == "ShaderNodeScript"}
+        if not group.users:
+            bpy.data.node_groups.remove(group)
+        # Blender gives every text a fake user.
+        bpy.data.batch_remove([held for held in images | texts if held and held.users == int(held.use_fake_user)])
 
 
 def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) -> bpy.types.NodeTree:

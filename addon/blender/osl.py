@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -19,6 +21,18 @@ def find_oslquery() -> None:
         sys.path.append(str(packages))
 
 
+@contextlib.contextmanager
+def _cycles() -> Iterator[None]:
+    """Cycles as the scene's engine: Blender asks the current engine to compile a script, and only Cycles can."""
+    render = bpy.context.scene.render
+    engine = render.engine
+    render.engine = "CYCLES"
+    try:
+        yield
+    finally:
+        render.engine = engine
+
+
 def script_node(tree: bpy.types.NodeTree, name: str, source: str) -> bpy.types.Node:
     """A script node in INTERNAL mode: text and bytecode are stored in the file. Raises RuntimeError with the log."""
     find_oslquery()
@@ -27,7 +41,8 @@ def script_node(tree: bpy.types.NodeTree, name: str, source: str) -> bpy.types.N
     node = tree.nodes.new("ShaderNodeScript")
     node.name = node.label = name
     node.mode = "INTERNAL"
-    node.script = text
+    with _cycles():
+        node.script = text
     if not node.outputs:
         raise RuntimeError(f"{name}: OSL did not compile; Blender's console has the reason")
     return node

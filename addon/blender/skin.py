@@ -10,7 +10,7 @@ from ..app.maps import bake_maps
 from ..domain.blood import BLOOD_CHANNELS
 from ..domain.plan import Plan
 from .controls import drive_blood
-from .material import build_skin_material
+from .material import MARK, build_skin_material, remove_skin_material
 from .surface import read_surface, store_rest
 
 
@@ -23,6 +23,9 @@ def apply_skin(
 ) -> bpy.types.Material:
     """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`."""
     maps = bake_maps(plan.maps, read_surface(face)) if plan.maps else {}
+    before = face.material_slots[slot].material if face.material_slots else None
+    if before is not None and MARK in before and before.users == 1:
+        remove_skin_material(before)
     material = build_skin_material(f"{face.name} skin", plan, maps, progress)
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
     if "rest_mm" in inputs:

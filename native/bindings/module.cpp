@@ -1,6 +1,8 @@
 // The module sanguine_core._core: one bind_* function per room of the library.
 #include <nanobind/nanobind.h>
 
+#include "counters.hpp"
+
 namespace nb = nanobind;
 
 void bind_optics(nb::module_& m);
@@ -11,4 +13,15 @@ NB_MODULE(_core, m) {
     m.attr("__version__") = SANGUINE_VERSION;
     bind_optics(m);
     bind_texture(m);
+    m.def(
+        "counters",
+        [] {
+            nb::dict counts;
+            for (const Counter* counter : counters.all()) counts[counter->name] = counter->count.load();
+            return counts;
+        },
+        "Work done since the last reset_counters().");
+    m.def("reset_counters", [] {
+        for (Counter* counter : counters.all()) counter->count = 0;
+    });
 }

@@ -1,5 +1,4 @@
 // Skin optics: coefficients, reflectance, profiles, colour, lobes.
-#include <atomic>
 #include <cmath>
 #include <optional>
 #include <variant>
@@ -10,6 +9,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 
+#include "counters.hpp"
 #include "sanguine/burley.hpp"
 #include "sanguine/chromophores.hpp"
 #include "sanguine/colour.hpp"
@@ -29,11 +29,6 @@ using MatrixIn = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::de
 using SpaceIn = std::variant<std::string, MatrixIn>;
 template <int dimensions> using ArrayOut = nb::ndarray<nb::numpy, double, nb::ndim<dimensions>>;
 using ProgressIn = std::optional<nb::callable>;
-
-/// Work done since the last reset, so that tests can prove that an inactive effect did none.
-struct Counters {
-    std::atomic<std::uint64_t> spectral_solves = 0, profile_solves = 0, lobe_fits = 0;
-} counters;
 
 /// The array owns the values from here on.
 template <int dimensions>
@@ -139,7 +134,7 @@ ArrayOut<2> py_reflectance(const TableIn& rows, const VectorIn& wavelengths_nm, 
         nb::gil_scoped_release release;
         out = reflectance(skins, view(wavelengths_nm), threads, with_gil(progress));
     }
-    counters.spectral_solves += out.size();
+    counters.spectral_solves.count += out.size();
     return to_numpy<2>(std::move(out), {skins.size(), wavelengths_nm.size()});
 }
 
@@ -174,7 +169,7 @@ ArrayOut<3> py_radial_profile(const TableIn& rows, const VectorIn& wavelengths_n
                                out[(i * waves + w) * radii + r] = profile.density(radius_mm.data()[r]);
                        });
     }
-    counters.profile_solves += skins.size() * waves;
+    counters.profile_solves.count += skins.size() * waves;
     return to_numpy<3>(std::move(out), {skins.size(), waves, radii});
 }
 
@@ -210,8 +205,8 @@ nb::dict py_burley_lobes(const TableIn& rows, const SpaceIn& working_space, int 
         nb::gil_scoped_release release;
         lobes = skin_lobes(skins, rgb, lobe_count, threads, with_gil(progress));
     }
-    counters.profile_solves += skins.size() * rgb_wavelength_count();
-    counters.lobe_fits += skins.size() * 3;
+    counters.profile_solves.count += skins.size() * rgb_wavelength_count();
+    counters.lobe_fits.count += skins.size() * 3;
 
     std::vector<double> weights, d_mm, clamped, fit_error, colours;
     for (const SkinLobes& skin : lobes) {
@@ -234,18 +229,6 @@ nb::dict py_burley_lobes(const TableIn& rows, const SpaceIn& working_space, int 
     result["fit_error"] = to_numpy<2>(std::move(fit_error), {n, 3});
     result["rgb"] = to_numpy<2>(std::move(colours), {n, 3});
     return result;
-}
-
-nb::dict py_counters() {
-    nb::dict result;
-    result["spectral_solves"] = counters.spectral_solves.load();
-    result["profile_solves"] = counters.profile_solves.load();
-    result["lobe_fits"] = counters.lobe_fits.load();
-    return result;
-}
-
-void reset_counters() {
-    counters.spectral_solves = counters.profile_solves = counters.lobe_fits = 0;
 }
 
 }  // namespace
@@ -298,6 +281,4 @@ void bind_optics(nb::module_& m) {
           "clamped (N, 3), share of the profile that is negative; fit_error (N, 3), L1 error over the plane per\n"
           "reflectance; rgb (N, 3), the reflectance. Cycles' radius is 4 pi d.");
 
-    m.def("counters", &py_counters, "Work done since the last reset_counters().");
-    m.def("reset_counters", &reset_counters);
 }

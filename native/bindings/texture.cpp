@@ -1,6 +1,7 @@
 // Images, chromophore maps and the UV raster.
-#include <algorithm>
-#include <map>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -11,6 +12,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "counters.hpp"
 #include "sanguine/exr_map.hpp"
 #include "sanguine/image.hpp"
 #include "sanguine/raster.hpp"
@@ -66,6 +68,7 @@ PixelsOut rasterize_uv(const UvIn& uv, const TrianglesIn& triangles, const Value
     sanguine::rasterize_uv({points(uv), corners(triangles), {values.data(), values.size()}, image.channels},
                            padding_px, {fill.data(), fill.size()}, {{image.pixels.get(), image.size()}, width, height},
                            threads);
+    counters.texels_rasterized.count += image.size();
     nb::gil_scoped_acquire acquire;
     return to_numpy(std::move(image));
 }

@@ -121,7 +121,7 @@ def test_counters_tell_what_was_done():
     core.surface(skins({}))
     assert set(core.counters().values()) == {0}  # neither solves anything
     core.reflectance(skins({}, {}), NM)
-    assert core.counters() == {"spectral_solves": 2 * len(NM), "profile_solves": 0, "lobe_fits": 0}
+    assert {name: count for name, count in core.counters().items() if count} == {"spectral_solves": 2 * len(NM)}
     core.burley_lobes(skins({}, {}, {}))
     assert core.counters()["lobe_fits"] == 9
     core.reset_counters()

@@ -6,9 +6,9 @@ from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scen
 EFFECTS: tuple[Effect, ...] = (
     scattering.EFFECT,
     anatomy.EFFECT,
-    mottle.EFFECT,
     perfusion.EFFECT,
     oxygenation.EFFECT,
+    mottle.EFFECT,  # after perfusion: a flush is blotchy too
     relief.EFFECT,
     oil.EFFECT,
 )

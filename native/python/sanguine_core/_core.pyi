@@ -84,11 +84,6 @@ def burley_lobes(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None
     reflectance; rgb (N, 3), the reflectance. Cycles' radius is 4 pi d.
     """
 
-def counters() -> dict:
-    """Work done since the last reset_counters()."""
-
-def reset_counters() -> None: ...
-
 class ImageError(OSError):
     pass
 
@@ -163,3 +158,8 @@ def contact_sheet(paths: Sequence[str | os.PathLike], captions: Sequence[str], o
 
     8-bit values are copied unchanged. `background` is 0 to 1 in the pictures' encoding. Raises ImageError.
     """
+
+def counters() -> dict:
+    """Work done since the last reset_counters()."""
+
+def reset_counters() -> None: ...

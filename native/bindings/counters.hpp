@@ -1,0 +1,22 @@
+// Work done since the last reset, so that tests can prove that an inactive effect did none.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+struct Counter {
+    const char* name;
+    std::atomic<std::uint64_t> count = 0;
+};
+
+struct Counters {
+    Counter spectral_solves{"spectral_solves"};      ///< reflectances: skins x wavelengths
+    Counter profile_solves{"profile_solves"};        ///< radial profiles: skins x wavelengths
+    Counter lobe_fits{"lobe_fits"};                  ///< fits: skins x channels
+    Counter texels_rasterized{"texels_rasterized"};  ///< pixels of drawn maps, each channel once
+
+    std::array<Counter*, 4> all() { return {&spectral_solves, &profile_solves, &lobe_fits, &texels_rasterized}; }
+};
+
+inline Counters counters;
