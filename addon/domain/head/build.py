@@ -45,6 +45,8 @@ def shaped(package: HeadPackage, base: BaseMesh, preset: Preset) -> tuple[np.nda
     for name, weight in preset.rest.items():
         unit_ = units[NAMES.index(name)]
         vertices += np.float32(weight) * unit_
+        if name.startswith("eyeWide"):  # a lid that rests wide has farther to go to close
+            units[NAMES.index(name.replace("Wide", "Blink"))] -= np.float32(weight) * unit_
         unit_ *= np.float32(1 - weight)
     return vertices, units
 
@@ -60,9 +62,11 @@ def _eyes_part(
         fits[side] = guide, *eyes_.fit_sphere(ball[ball[:, 1] > np.quantile(ball[:, 1], 0.25)])
     middle = (fits["left"][1] + fits["right"][1]) / 2
     target = middle - np.array([0, eyes_.GAZE_M, 0], np.float32)
-    for guide, centre, radius in fits.values():
+    for side, (guide, centre, radius) in fits.items():
         v, f, uv, material = eyes_.eyeball(centre, radius - eyes_.FILM_M, target)
-        moved.append(eyes_.carried(v, vertices[guide], units[:, guide]))
+        follow = eyes_.carried(v, vertices[guide], units[:, guide])
+        follow[NAMES.index(f"eyeBlink{side.title()}")] += np.float32([0, eyes_.BLINK_RETRACTION_M, 0])
+        moved.append(follow)
         pieces.append((v, f + offset, uv, material))
         offset += len(v)
     v, f, uv, material = (np.concatenate(column) for column in zip(*pieces))

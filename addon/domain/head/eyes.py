@@ -10,8 +10,11 @@ SLOTS = ("eye", "cornea")
 LIMBUS_UV = 0.25  # radius of the limbus in the eye's UV map, about (0.5, 0.5); the look is drawn in its multiples
 IRIS_RADIUS_M = 0.0060  # horizontal visible iris diameter 11.7 +- 0.5 mm (Rufer et al. 2005), a little over
 IRIS_DEPTH_M = 0.0009
-CORNEA_BULGE_M = 0.0013  # height of the cornea (radius 7.8 mm) above the globe at the apex
+CORNEA_BULGE_M = 0.0010  # height of the cornea (radius 7.8 mm) above the globe at the apex
 FILM_M = 0.00006  # the shell floats this far off the sclera
+# A blink draws the globe back (Doane 1980, about 1 mm; the rest is a guess): the lids' linear keys take a short cut
+# through it on their way down, and the cornea must not come out through a half-closed lid.
+BLINK_RETRACTION_M = 0.0026
 GAZE_M = 1.0  # the eyes converge on a point this far in front: the portrait camera
 
 SEGMENTS = 48
