@@ -15,10 +15,10 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
 hash = $(firstword $(shell cat $(1) | sha256sum))
-RUN_LISTS := tools/requirements-addon.txt tools/requirements-run.txt tools/requirements-build.txt
-TEST_LISTS := tools/requirements-test.txt
-RUN_STAMP := $(VENV)/.run-$(call hash,$(RUN_LISTS))
-TEST_STAMP := $(VENV)/.test-$(call hash,$(TEST_LISTS))
+lists = $(1:%=tools/requirements-%.txt)
+BUILD_STAMP := $(VENV)/.build-$(call hash,$(call lists,build))
+RUN_STAMP := $(VENV)/.run-$(call hash,$(call lists,addon run))
+TEST_STAMP := $(VENV)/.test-$(call hash,$(call lists,test))
 NATIVE_STAMP := $(VENV)/.native
 ADDON_STAMP := $(VENV)/.addon
 OIIO := .cache/openimageio
@@ -45,16 +45,16 @@ test: setup $(TEST_STAMP) ## Install what is needed and run every test
 	ctest --preset default
 	$(PY) -m pytest tests
 
-setup: system $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
+setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
 
-native: $(NATIVE_STAMP) ## Build the native wheel and install it into .venv
+native: $(NATIVE_STAMP) $(RUN_STAMP) ## Build the native wheel and install it into .venv
 
 openimageio: $(OIIO_STAMP) ## Fetch the libraries and headers of OpenImageIO
 
-stub: $(NATIVE_STAMP) ## Write the committed stub of the native module anew
+stub: native ## Write the committed stub of the native module anew
 	$(PY) -m nanobind.stubgen -m sanguine_core._core -o native/python/sanguine_core/_core.pyi
 
-extension: $(NATIVE_STAMP) ## Build the Blender extension into dist/
+extension: native ## Build the Blender extension into dist/
 	$(PY) tools/build_extension.py
 
 matrix: extension $(TEST_STAMP) ## Run the Blender tests on the other Blender versions
@@ -69,27 +69,32 @@ system:
 $(PY): | system
 	$(PYTHON) -m venv $(VENV)
 
+# Every list is complete and installed as it stands: --no-deps.
+$(BUILD_STAMP): | $(PY)
+	$(PIP) --no-deps --requirement tools/requirements-build.txt
+	@rm -f $(VENV)/.build-* && touch $@
+
 $(RUN_STAMP): | $(PY)
-	$(PIP) --no-deps $(RUN_LISTS:%=--requirement %)
+	$(PIP) --no-deps --requirement tools/requirements-run.txt
 	@rm -f $(VENV)/.run-* && touch $@
 
-$(TEST_STAMP): | $(RUN_STAMP)
-	$(PIP) --no-deps $(TEST_LISTS:%=--requirement %)
+$(TEST_STAMP): | $(PY)
+	$(PIP) --no-deps --requirement tools/requirements-test.txt
 	@rm -f $(VENV)/.test-* && touch $@
 
-$(OIIO_STAMP): | $(RUN_STAMP)
+$(OIIO_STAMP): | $(BUILD_STAMP)
 	$(PY) tools/fetch_openimageio.py $(OIIO)
 	@touch $@
 
 # auditwheel copies the image libraries into the wheel under hashed names, so
 # that they never meet Blender's own.
-$(NATIVE_STAMP): $(NATIVE_SOURCES) $(RUN_STAMP) $(OIIO_STAMP)
+$(NATIVE_STAMP): $(NATIVE_SOURCES) $(BUILD_STAMP) $(OIIO_STAMP)
 	rm -rf build/raw dist/wheels/sanguine_core-*
 	$(PY) -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir build/raw .
 	LD_LIBRARY_PATH=$(CURDIR)/$(OIIO)/lib auditwheel repair --wheel-dir dist/wheels build/raw/*.whl
 	$(PIP) --no-deps --force-reinstall dist/wheels/sanguine_core-*.whl
 	@touch $@
 
-$(ADDON_STAMP): addon/pyproject.toml addon/blender_manifest.toml | $(NATIVE_STAMP)
+$(ADDON_STAMP): addon/pyproject.toml addon/blender_manifest.toml | $(NATIVE_STAMP) $(RUN_STAMP)
 	$(PIP) --no-deps --no-build-isolation --editable addon
 	@touch $@

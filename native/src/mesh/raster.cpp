@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -189,7 +190,7 @@ void rasterize_uv(const UvMesh& mesh, int padding_px, std::span<const float> fil
                 rasterizer.draw(padding_px, fill);
             });
         else
-            rasterizer.draw(padding_px, fill);  // this thread takes the last band instead of waiting
+            rasterizer.draw(padding_px, fill);  // this thread does the remaining one instead of waiting
     }
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include <OpenImageIO/imagebuf.h>
@@ -39,7 +38,7 @@ std::unique_ptr<OIIO::ImageInput> open_checked(const fs::path& path) {
     return input;
 }
 
-/// `rows` counts from the top, as in the file; a negative stride turns the picture over.
+/// `top_row` is where the file's first row goes; a negative stride turns the picture over.
 void read_pixels(OIIO::ImageInput& input, const fs::path& path, OIIO::TypeDesc type, void* top_row,
                  OIIO::stride_t row_stride) {
     const OIIO::ImageSpec& spec = input.spec();

@@ -1,0 +1,23 @@
+"""nanobind counts what is still alive when the interpreter ends, and says so: it must have nothing to say."""
+
+import subprocess
+import sys
+
+SCRIPT = """
+import numpy, sanguine_core
+pixels = sanguine_core.rasterize_uv(
+    numpy.array([[0, 0], [1, 0], [0, 1]], numpy.float32), numpy.array([[0, 1, 2]], numpy.int32),
+    numpy.ones((3, 1), numpy.float32), 8, 8, 0, numpy.zeros(1, numpy.float32))
+view = pixels[2:, 2:]
+del pixels
+assert view.max() == 1
+try:
+    sanguine_core.read_image("absent.png")
+except sanguine_core.ImageError:
+    pass
+"""
+
+
+def test_nothing_leaks(tmp_path):
+    result = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, cwd=tmp_path)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
