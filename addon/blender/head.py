@@ -123,11 +123,10 @@ def _bind_skin(obj: bpy.types.Object, rig: bpy.types.Object, head: Head) -> None
     obj.modifiers.new("Armature", "ARMATURE").object = rig
 
 
-def build_face(head: Head, preset: Preset, skin_material: bpy.types.Material, scene: bpy.types.Scene | None = None) -> FaceObjects:
-    """Make the objects of a head in a collection of its own, named after the preset."""
-    scene = scene or bpy.context.scene
+def build_face(head: Head, preset: Preset, skin_material: bpy.types.Material) -> FaceObjects:
+    """Make the objects of a head in the open scene, in a collection of their own named after the preset."""
     collection = bpy.data.collections.new(head.preset)
-    scene.collection.children.link(collection)
+    bpy.context.scene.collection.children.link(collection)
     materials = {"skin": skin_material, **looks(preset)}
     rig = _rig(f"{head.preset}_rig", head, collection)
     objects = {}

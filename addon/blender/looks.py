@@ -105,7 +105,9 @@ def cornea(name: str) -> bpy.types.Material:
     return n.surface(n.add("ShaderNodeMixShader", fresnel, clear, mirror))
 
 
-def _wet(name: str, color: RGB, roughness: float = 0.25, radius: RGB = (1.0, 0.35, 0.2), scale_m: float = 0.002) -> bpy.types.Material:
+def _wet(
+    name: str, color: RGB, roughness: float = 0.25, radius: RGB = (1.0, 0.35, 0.2), scale_m: float = 0.002
+) -> bpy.types.Material:
     """Soft tissue under saliva."""
     return Nodes(name).principled(
         Base_Color=color,
@@ -124,12 +126,15 @@ def _fibre(name: str, color: RGB) -> bpy.types.Material:
 
 def _hair(name: str, melanin: float, redness: float) -> bpy.types.Material:
     n = Nodes(name)
-    shader = n.add(
-        "ShaderNodeBsdfHairPrincipled",
-        settings={"parametrization": "MELANIN"},
-        **{"Melanin": melanin, "Melanin Redness": redness, "Roughness": 0.42, "Radial Roughness": 0.6, "Random Color": 0.15, "IOR": 1.38},
-    )
-    return n.surface(shader)
+    inputs = {
+        "Melanin": melanin,
+        "Melanin Redness": redness,
+        "Roughness": 0.42,
+        "Radial Roughness": 0.6,
+        "Random Color": 0.15,
+        "IOR": 1.38,  # below keratin's 1.55: what a coat of this few, thick hairs may mirror before it looks grey
+    }
+    return n.surface(n.add("ShaderNodeBsdfHairPrincipled", settings={"parametrization": "MELANIN"}, **inputs))
 
 
 def looks(preset: Preset) -> dict[str, bpy.types.Material]:

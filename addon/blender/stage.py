@@ -26,8 +26,8 @@ class Light:
     mirrored: bool = True  # seen in the eyes and in highlights
 
 
-# Key from the side and above, so that cheekbone, nose and lips turn in the light; a broad weak fill that leaves one catchlight in the eye; a rim that
-# parts the head from the dark. Neutral white: what colour the skin has is the skin's own.
+# Key from the side and above, so that cheekbone, nose and lips turn in the light; a broad weak fill that leaves
+# one catchlight in the eye; rims that part the head from the dark. Neutral white: the skin's colour is its own.
 LIGHTS = (
     Light("key", -42, 32, 1.1, 0.45, 19.0),
     Light("fill", 55, 5, 1.4, 1.0, 3.2, mirrored=False),
@@ -98,7 +98,8 @@ def set_stage(
         obj = bpy.data.objects.new(light.name, data)
         a, e = math.radians(light.azimuth), math.radians(light.elevation)
         obj.visible_glossy = light.mirrored
-        obj.location = middle + light.distance * Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
+        direction = Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
+        obj.location = middle + light.distance * direction
         _aim(obj, Vector((0, eyes_.y, eyes_.z - 0.03)))
         scene.collection.objects.link(obj)
 

@@ -20,7 +20,8 @@ def read_top_down(path):
 
 
 def build(name):
-    return build_head(load_presets(rigs_path("heads.toml"))[name], load_regions(rigs_path("regions.toml")), read_top_down)
+    preset = load_presets(rigs_path("heads.toml"))[name]
+    return build_head(preset, load_regions(rigs_path("regions.toml")), read_top_down)
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +136,7 @@ def test_regions_lie_where_their_names_say(head):
 def test_eyes_look_at_the_camera_and_turn_without_changing_size(head, side):
     eyes, centre = head.part("eyes"), head.landmarks[f"eye_{side}"]
     own = np.linalg.norm(eyes.vertices - centre, axis=1) < 0.02
-    pupil = eyes.vertices[: 48] if side == "left" else eyes.vertices[len(eyes.vertices) // 2 :][:48]
+    pupil = eyes.vertices[:48] if side == "left" else eyes.vertices[len(eyes.vertices) // 2 :][:48]
     gaze = pupil.mean(axis=0) - centre
     target = head.landmarks["eyes"] - [0, GAZE_M, 0]
     toward = target - centre

@@ -55,7 +55,8 @@ def _lathe(angle: np.ndarray, radius: np.ndarray, depth: np.ndarray, limbus: flo
     """
     turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    vertices = np.concatenate([radius[:, None, None] * ring, np.broadcast_to(depth[:, None, None], (len(radius), SEGMENTS, 1))], axis=-1)
+    level = np.broadcast_to(depth[:, None, None], (len(depth), SEGMENTS, 1))
+    vertices = np.concatenate([radius[:, None, None] * ring, level], axis=-1)
     uv = 0.5 + LIMBUS_UV * (angle / limbus)[:, None, None] * ring
     here = np.arange(SEGMENTS)
     there = np.roll(here, -1)
@@ -64,7 +65,9 @@ def _lathe(angle: np.ndarray, radius: np.ndarray, depth: np.ndarray, limbus: flo
     return vertices.reshape(-1, 3), faces, uv.reshape(-1, 2)[faces]
 
 
-def eyeball(centre: np.ndarray, globe_m: float, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def eyeball(
+    centre: np.ndarray, globe_m: float, target: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """One eye looking at `target`: vertices, faces, uv, material (0 eye, 1 cornea)."""
     limbus = np.arcsin(IRIS_RADIUS_M / globe_m)
     # Inside: the iris bowl to the limbus, then the globe. The first ring is a hair's breadth inside the pupil.

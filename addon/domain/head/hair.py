@@ -8,7 +8,7 @@ import numpy as np
 
 from .model import StrandPart
 from .presets import Hair
-from .surface import Binding, scatter_on, smoothstep, triangles, unit, vertex_normals
+from .surface import scatter_on, smoothstep, triangles, unit, vertex_normals
 
 AXIS_BEHIND_EYES_MM = 70.0  # the vertical line about which the hairline's azimuth is counted
 KNOT_HEIGHT_MM = 12.0  # of tied hair, above the eyes
@@ -17,7 +17,7 @@ WHORL_HEIGHT_MM = 88.0  # of cropped hair, at the back of the crown
 
 
 def scalp_mask(hair: Hair, base: np.ndarray, ears: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-    """(V,) 0..1: how densely hair grows; soft at the hairline. `base` is the unshaped mesh, so one line fits all faces."""
+    """(V,) 0..1: how densely hair grows. `base` is the unshaped mesh, so one hairline fits all faces."""
     line = np.array(hair.hairline)
     rel = (base - eyes) * 1000
     azimuth = np.degrees(np.arctan2(np.abs(rel[:, 0]), AXIS_BEHIND_EYES_MM - rel[:, 1]))
@@ -28,7 +28,7 @@ def scalp_mask(hair: Hair, base: np.ndarray, ears: np.ndarray, eyes: np.ndarray)
 
 
 class SkullRadius:
-    """Distance of the scalp from a centre as a polynomial of direction (the span of spherical harmonics up to `degree`)."""
+    """Distance of the scalp from a centre: a polynomial of direction, the span of spherical harmonics up to `degree`."""
 
     def __init__(self, points: np.ndarray, centre: np.ndarray, degree: int = 7):
         self.centre = centre
@@ -64,7 +64,9 @@ def _crop(hair: Hair, root: np.ndarray, normal: np.ndarray, eyes: np.ndarray, rn
     s = np.linspace(0, 1, 6)
     reach = length[:, None] * s
     out = np.sin(rise)[:, None] * reach * (1 - 0.38 * s) - (reach * np.cos(rise)[:, None]) ** 2 / 0.2
-    return root[:, None] + along[:, None] * (np.cos(rise)[:, None] * reach)[..., None] + normal[:, None] * (out - 4e-4 * (s == 0))[..., None]
+    out = out - 4e-4 * (s == 0)  # rooted in the skin
+    forth = np.cos(rise)[:, None] * reach
+    return root[:, None] + along[:, None] * forth[..., None] + normal[:, None] * out[..., None]
 
 
 def _tied(hair: Hair, root: np.ndarray, skull: SkullRadius, eyes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -111,12 +113,14 @@ def grow(
     """Strands on the shaped skin: `density` per vertex (scalp_mask), `eyes` the point between the eyes."""
     normals = vertex_normals(vertices, faces)
     haired = faces[density[faces].max(axis=1) > 0]
-    binding: Binding = scatter_on(vertices, triangles(haired), density, hair.count, rng)
+    binding = scatter_on(vertices, triangles(haired), density, hair.count, rng)
     root, normal = binding(vertices), unit(binding(normals))
     if hair.style == "crop":
         points = _crop(hair, root, normal, eyes, rng)
     else:
         skull = SkullRadius(vertices[np.unique(haired)], eyes + np.array([0, AXIS_BEHIND_EYES_MM, 20]) * 1e-3)
         points = _tied(hair, root, skull, eyes, rng)
-        points = np.concatenate([points, _knot(hair.count // 10, points[:, -1].mean(axis=0) + [0, 0.012, 0], rng)])
-    return StrandPart("hair", points.astype(np.float32), _taper(len(points), points.shape[1], hair.radius_mm, rng).astype(np.float32))
+        knot = points[:, -1].mean(axis=0) + [0, KNOT_RADIUS_MM * 0.4e-3, 0]
+        points = np.concatenate([points, _knot(hair.count // 10, knot, rng)])
+    radius = _taper(len(points), points.shape[1], hair.radius_mm, rng)
+    return StrandPart("hair", points.astype(np.float32), radius.astype(np.float32))

@@ -52,8 +52,8 @@ class StrandPart:
 class Head:
     """A whole head.
 
-    parts     : 'skin' first; then eyes, teeth, tongue, lashes, brows, tear line
-    hair      : scalp strands, or None
+    parts     : skin, eyes, tears, teeth, tongue, lashes, brows
+    hair      : scalp strands
     regions   : region id -> (V_skin,) float32, 0..1, in the order of the skin's vertices; they sum to at most 1
     scalp     : (V_skin,) float32, 0..1, how densely hair grows (its shadow darkens the skin between the hairs)
     landmarks : name -> (3,) float32 position in the neutral face, metres
@@ -62,7 +62,7 @@ class Head:
     """
 
     parts: tuple[MeshPart, ...]
-    hair: StrandPart | None
+    hair: StrandPart
     regions: dict[str, np.ndarray]
     scalp: np.ndarray
     landmarks: dict[str, np.ndarray]
@@ -73,7 +73,7 @@ class Head:
         return next(part for part in self.parts if part.name == name)
 
 
-def shape_keys(names: list[str], dense: np.ndarray, threshold_m: float = 1e-5) -> dict[str, ShapeKey]:
+def shape_keys(names: tuple[str, ...], dense: np.ndarray, threshold_m: float = 1e-5) -> dict[str, ShapeKey]:
     """Dense displacements (units, V, 3) -> only the keys, and in them only the vertices, that move."""
     moved = (np.abs(dense) > threshold_m).any(axis=-1)
     rows = [np.nonzero(m)[0].astype(np.int32) for m in moved]

@@ -39,7 +39,8 @@ class Hair(Row):
     radius_mm: Millimetres
     melanin: Fraction  # of Principled Hair: 0 white, 1 black
     redness: Fraction
-    hairline: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]  # (degrees from the front, mm above the eyes)
+    # (degrees from the front, mm above the eyes), from the forehead round to the nape
+    hairline: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)]
 
 
 class Preset(Row):

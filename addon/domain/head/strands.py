@@ -49,10 +49,17 @@ def tubes(
 
 
 def brow_binding(
-    brows: Brows, side: float, eye: np.ndarray, base: np.ndarray, faces: np.ndarray, rng: np.random.Generator, points: int = 6
+    brows: Brows,
+    side: float,
+    eye: np.ndarray,
+    base: np.ndarray,
+    faces: np.ndarray,
+    rng: np.random.Generator,
+    points: int = 6,
 ) -> tuple[Binding, np.ndarray]:
-    """Strands of one brow tied to the surface: a binding of N*points rows, and the height of each above the skin (m).
+    """Strands of one brow tied to the surface: a binding of N*points rows, and the height of each over the skin, m.
 
+    side        : +1 left, -1 right
     base, faces : the refined skin, unshaped, so that one drawing of the brow fits every face
     eye         : middle of this eye on the unshaped mesh
     """
@@ -77,7 +84,8 @@ def brow_binding(
     flat = np.stack([side * px, pz], axis=-1).reshape(-1, 2) * 1e-3 + [0, eye[2]]
     centre = base[faces].mean(axis=1)
     low_corner, high_corner = flat.min(axis=0) - 0.004, flat.max(axis=0) + 0.004
-    near = ((centre[:, [0, 2]] > low_corner) & (centre[:, [0, 2]] < high_corner)).all(axis=1) & (centre[:, 1] < eye[1] + 0.02)
+    front = centre[:, [0, 2]]
+    near = ((front > low_corner) & (front < high_corner)).all(axis=1) & (centre[:, 1] < eye[1] + 0.02)
     height = np.sin(np.pi * np.clip(s * 0.75, 0, 1)) * 0.55 + rng.uniform(-0.1, 0.25, (n, 1)) * s
     height = (height + 0.05 - 0.15 * (s == 0)) * 1e-3
     return locate(flat, base[:, [0, 2]], triangles(faces[near])), height.ravel()
@@ -103,9 +111,15 @@ def grid_of(faces: np.ndarray) -> np.ndarray:
 
 
 def lash_binding(
-    card: np.ndarray, eye: np.ndarray, base: np.ndarray, count: int, reach: float, rng: np.random.Generator, points: int = 6
+    card: np.ndarray,
+    eye: np.ndarray,
+    base: np.ndarray,
+    count: int,
+    reach: float,
+    rng: np.random.Generator,
+    points: int = 6,
 ) -> Binding:
-    """Single lashes laid in the base mesh's lash card (quads), up to `reach` times as long: count*points rows."""
+    """Single lashes laid in a lash card of the base mesh (quads), up to `reach` times as long: count*points rows."""
     grid = grid_of(card)
     if grid.shape[0] > grid.shape[1]:
         grid = grid.T

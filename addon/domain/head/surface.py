@@ -63,7 +63,8 @@ class Subdivision:
         """Values (V, C) on the cage -> values on the vertices of the finer mesh."""
         face = values[self.faces_in].mean(axis=1)
         middle = values[self.edges].mean(axis=1)
-        edge = np.where(self.boundary_edge[:, None], middle, (middle + self._face_to_edge.mean(np.repeat(face, 4, 0))) / 2)
+        inner_edge = (middle + self._face_to_edge.mean(np.repeat(face, 4, axis=0))) / 2
+        edge = np.where(self.boundary_edge[:, None], middle, inner_edge)
         valence = np.maximum(self._edge_to_vertex.count, 1)[:, None].astype(values.dtype)
         around_face = self._face_to_vertex.mean(np.repeat(face, 4, axis=0))
         around_edge = self._edge_to_vertex.mean(np.repeat(middle, 2, axis=0))
@@ -141,7 +142,9 @@ def locate(points: np.ndarray, plane: np.ndarray, tris: np.ndarray, chunk: int =
     return Binding(index, weight)
 
 
-def scatter_on(vertices: np.ndarray, tris: np.ndarray, density: np.ndarray, count: int, rng: np.random.Generator) -> Binding:
+def scatter_on(
+    vertices: np.ndarray, tris: np.ndarray, density: np.ndarray, count: int, rng: np.random.Generator
+) -> Binding:
     """`count` random points on triangles, as many per area as the per-vertex density says."""
     a, b, c = (vertices[tris[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) * density[tris].mean(axis=1)
