@@ -57,7 +57,7 @@ def test_shape_keys_bear_arkits_names_and_rest_at_zero(face, head):
     for part in head.parts:
         blocks = face.parts[part.name].data.shape_keys.key_blocks
         assert list(blocks.keys()) == ["Basis", *part.shape_keys]
-        assert all(block.value == 0.0 for block in blocks)
+        assert all(block.value == 0.0 for block in blocks[1:])
 
 
 def test_everything_turns_with_the_head_bone(face, head):
@@ -72,7 +72,7 @@ def test_everything_turns_with_the_head_bone(face, head):
         if name == "skin":  # the shoulders stay
             low = before[name][:, 2] < head.landmarks["neck"][2] - 0.06
             assert moved[low].max() < 1e-3
-            assert moved[before[name][:, 2] > head.landmarks["chin"][2]].min() > 1e-4
+            assert moved[before[name][:, 2] > head.landmarks["chin"][2]].mean() > 0.02
         else:
             assert moved.max() > 0.004, name
     assert face.hair.matrix_world != hair

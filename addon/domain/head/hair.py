@@ -28,7 +28,7 @@ def scalp_mask(hair: Hair, base: np.ndarray, ears: np.ndarray, eyes: np.ndarray)
 
 
 class SkullRadius:
-    """Distance of the scalp from a centre: a polynomial of direction, the span of spherical harmonics up to `degree`."""
+    """Distance of the scalp from a centre: a polynomial of direction (spherical harmonics up to `degree`)."""
 
     def __init__(self, points: np.ndarray, centre: np.ndarray, degree: int = 7):
         self.centre = centre

@@ -64,7 +64,7 @@ def brow_binding(
     eye         : middle of this eye on the unshaped mesh
     """
     n = brows.count
-    # As many hairs per area everywhere: where the brow is higher, there are more; the inner end is sparse, the tail dense.
+    # More hairs where the brow is higher; a sparse inner end, a dense tail.
     fine = np.linspace(0, 1, 201)
     share = np.interp(fine, BROW[:, 0], BROW[:, 3] * [0.7, 1, 1, 1.1, 1.3, 1.3])
     t = np.interp(rng.random(n), np.cumsum(share) / share.sum(), fine)
@@ -143,7 +143,9 @@ def lash_binding(
     return Binding(index, weight)
 
 
-def tear_binding(vertices: np.ndarray, edges: np.ndarray, centre: np.ndarray, globe_m: float, points: int = 60) -> Binding:
+def tear_binding(
+    vertices: np.ndarray, edges: np.ndarray, centre: np.ndarray, globe_m: float, points: int = 60
+) -> Binding:
     """The line where the lids touch the globe, as a closed loop of `points` bound to skin edges (two weights each).
 
     vertices, edges : the refined skin. An edge that passes through the globe's surface gives one point; in each of
