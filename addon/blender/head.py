@@ -145,8 +145,6 @@ def build_face(head: Head, preset: Preset, skin_material: bpy.types.Material) ->
         if part.subdivision:
             modifier = obj.modifiers.new("Subdivision", "SUBSURF")
             modifier.levels, modifier.render_levels = 1, part.subdivision
-    scalp = objects["skin"].data.attributes.new("scalp", "FLOAT", "POINT")
-    scalp.data.foreach_set("value", head.scalp)
     name = f"{head.preset}_{head.hair.name}"
     hair = bpy.data.objects.new(name, _curves(name, head.hair))
     hair.data.materials.append(materials[head.hair.slot])

@@ -137,6 +137,15 @@ def _hair(name: str, melanin: float, redness: float) -> bpy.types.Material:
     return n.surface(n.add("ShaderNodeBsdfHairPrincipled", settings={"parametrization": "MELANIN"}, **inputs))
 
 
+def undercoat(name: str, color: RGB) -> bpy.types.Material:
+    """The shade between the hairs: as opaque as hair is dense, which the part's UV map holds in u."""
+    n = Nodes(name)
+    density = n.add("ShaderNodeSeparateXYZ", n.add("ShaderNodeUVMap"))
+    clear = n.add("ShaderNodeBsdfTransparent")
+    shade = n.add("ShaderNodeBsdfDiffuse", color)
+    return n.surface(n.add("ShaderNodeMixShader", n.math("MULTIPLY", density, 0.85), clear, shade))
+
+
 def looks(preset: Preset) -> dict[str, bpy.types.Material]:
     """A material for every slot of a head but the skin's."""
     name = f"{preset.id}_{{}}".format
@@ -149,5 +158,6 @@ def looks(preset: Preset) -> dict[str, bpy.types.Material]:
         "mouth": _wet(name("mouth"), (0.30, 0.07, 0.06)),
         "lashes": _fibre(name("lashes"), (0.012, 0.008, 0.006)),
         "brows": _fibre(name("brows"), preset.brows.color),
+        "undercoat": undercoat(name("undercoat"), preset.brows.color),
         "hair": _hair(name("hair"), preset.hair.melanin, preset.hair.redness),
     }

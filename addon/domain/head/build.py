@@ -17,6 +17,7 @@ from .regions import ImageReader, Region, region_weights
 from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
 
 TEAR_RADIUS_M = 0.00035  # the meniscus of tears is 0.2 to 0.5 mm high
+UNDERCOAT_M = 0.0004
 UPPER_LASHES = ("2", 130, 1.9)  # the card's name in hm08, lashes in each eye, length over the card's height
 LOWER_LASHES = ("1", 60, 1.0)
 
@@ -213,6 +214,17 @@ def _brows(person: Person, preset: Preset, fine: FineSkin, rng: np.random.Genera
     return _hairs("brows", spine, np.concatenate(ups), radius, moves)
 
 
+def _undercoat(fine: FineSkin, density: np.ndarray) -> MeshPart:
+    """A shade just above the scalp, so that skin does not shine through between hairs that are fewer than in life."""
+    haired = density[fine.faces].max(axis=1) > 0.02
+    source, faces = np.unique(fine.faces[haired], return_inverse=True)
+    faces = faces.reshape(-1, 4)
+    above = fine.vertices + vertex_normals(fine.vertices, fine.faces) * UNDERCOAT_M
+    uv = np.stack([density, np.full_like(density, 0.5)], axis=-1)[source][faces]
+    piece = (above[source], faces, fine.units[:, source])
+    return _part("undercoat", ("undercoat",), [piece], uv, subdivision=1)
+
+
 def build_head(
     preset: Preset, regions: tuple[Region, ...], read_image: ImageReader, package: HeadPackage | None = None
 ) -> Head:
@@ -239,8 +251,8 @@ def build_head(
     weights = region_weights(regions, package, person.base, bust, read_image)
     base_eyes = (person.base_eye("l") + person.base_eye("r")) / 2
     ears = weights.get("ears", np.zeros(len(skin), np.float32))
-    scalp = hair.scalp_mask(preset.hair, base_skin, ears, base_eyes).astype(np.float32)
-    density = subdivide(scalp[:, None])[:, 0]
+    scalp = hair.scalp_mask(preset.hair, base_skin, ears, base_eyes)
+    density = subdivide(scalp[:, None].astype(np.float32))[:, 0]
     skin_moves = person.units[:, bust.source]
     parts = (
         _part("skin", SKIN_SLOTS, [(skin, bust.faces, skin_moves)], bust.uv, bust.material, subdivision=2),
@@ -250,6 +262,7 @@ def build_head(
         _tongue(person),
         _lashes(person, preset.lash_radius_mm, rng),
         _brows(person, preset, fine, rng),
+        _undercoat(fine, density),
     )
     strands_ = hair.grow(preset.hair, density, fine.vertices, fine.faces, landmarks["eyes"], rng)
-    return Head(parts, strands_, weights, scalp, landmarks, preset.id, LICENCE)
+    return Head(parts, strands_, weights, landmarks, preset.id, LICENCE)

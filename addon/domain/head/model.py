@@ -52,10 +52,9 @@ class StrandPart:
 class Head:
     """A whole head.
 
-    parts     : skin, eyes, tears, teeth, tongue, lashes, brows
+    parts     : skin, eyes, tears, teeth, tongue, lashes, brows, undercoat
     hair      : scalp strands
     regions   : region id -> (V_skin,) float32, 0..1, in the order of the skin's vertices; they sum to at most 1
-    scalp     : (V_skin,) float32, 0..1, how densely hair grows (its shadow darkens the skin between the hairs)
     landmarks : name -> (3,) float32 position in the neutral face, metres
     preset    : the id in heads.toml
     licence   : of the geometry
@@ -64,7 +63,6 @@ class Head:
     parts: tuple[MeshPart, ...]
     hair: StrandPart
     regions: dict[str, np.ndarray]
-    scalp: np.ndarray
     landmarks: dict[str, np.ndarray]
     preset: str
     licence: str
