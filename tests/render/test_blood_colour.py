@@ -4,8 +4,6 @@ import bpy
 import colour
 import numpy as np
 import pytest
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
 from sanguine.blender.controls import CONTROLS, remove_shape_key_drivers, set_controls
 from sanguine.blender.face import add_face
 from sanguine.blender.skin import apply_skin
@@ -15,7 +13,7 @@ from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import check_strengths, make_plan
-from support.patch import empty_scene, render_linear, white_world
+from support.patch import empty_scene, mean_around, render_linear, white_world
 
 D65 = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
 WIDTH, HEIGHT = 160, 200
@@ -39,12 +37,6 @@ def white_patch(beside):
     output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
     material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
     mesh.materials.append(material)
-    return Vector(beside)
-
-
-def pixel(place):
-    at = world_to_camera_view(bpy.context.scene, bpy.context.scene.camera, Vector(place))
-    return int(at.x * WIDTH), int(at.y * HEIGHT)
 
 
 def cheeks_lab(melanin):
@@ -59,19 +51,15 @@ def cheeks_lab(melanin):
     apply_skin(face.skin, face.rig, plan)
     remove_shape_key_drivers(face.rig, bpy.data.objects)
     eyes = face.landmarks["eyes"]
-    card = white_patch((eyes[0] + 0.12, eyes[1], eyes[2] + 0.08))
-    bpy.context.view_layer.update()
+    card = (eyes[0] + 0.12, eyes[1], eyes[2] + 0.08)
+    white_patch(card)
     found = {}
     for name in ("neutral", *EMOTIONS):
         set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0) | {"blood": 1.0} | ({name: 1.0} if name in EMOTIONS else {}))
         image = render_linear()
-        cx, cy = pixel(card)
-        white = image[cy - 2 : cy + 3, cx - 2 : cx + 3].mean((0, 1))
+        white = mean_around(image, card, 2)
         assert np.all(white > 0.5), "the white patch is not where it is looked for"
-        cheeks = []
-        for side in ("cheek_left", "cheek_right"):
-            x, y = pixel(face.landmarks[side])
-            cheeks.append(image[y - CHEEK_PX : y + CHEEK_PX + 1, x - CHEEK_PX : x + CHEEK_PX + 1].mean((0, 1)))
+        cheeks = [mean_around(image, face.landmarks[side], CHEEK_PX) for side in ("cheek_left", "cheek_right")]
         rgb = np.mean(cheeks, axis=0) / white
         found[name] = colour.XYZ_to_Lab(colour.RGB_to_XYZ(rgb, "sRGB"), D65)
     return found

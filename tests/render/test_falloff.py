@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 import sanguine_core
-from support.patch import camera_above, empty_scene, plane, render_linear
 from sanguine.blender.material import build_skin_material
 from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.parameters import default_skin, skin_rows
 from sanguine.domain.plan import make_plan
+from support.patch import camera_above, empty_scene, plane, render_linear
 
 WIDTH_MM = 16.0
 COLUMNS = 256

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
 from sanguine.blender.render import quiet, save_render
 
 
@@ -75,3 +77,17 @@ def read_linear(path: Path) -> np.ndarray:
     finally:
         bpy.data.images.remove(image)
     return pixels.reshape(height, width, 4)[..., :3].astype(np.float64)
+
+
+def pixel_of(place: tuple[float, float, float]) -> tuple[int, int]:
+    """(x, y) of the pixel of `render_linear` in which the scene's camera sees a place."""
+    scene = bpy.context.scene
+    bpy.context.view_layer.update()
+    at = world_to_camera_view(scene, scene.camera, Vector(place))
+    return int(at.x * scene.render.resolution_x), int(at.y * scene.render.resolution_y)
+
+
+def mean_around(pixels: np.ndarray, place: tuple[float, float, float], half: int) -> np.ndarray:
+    """Mean colour of the square of 2 half + 1 pixels around a place."""
+    x, y = pixel_of(place)
+    return pixels[y - half : y + half + 1, x - half : x + half + 1].mean((0, 1))

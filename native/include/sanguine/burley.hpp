@@ -26,7 +26,8 @@ struct BurleyFit {
 
 /// Fits lobes to the energies (signed) in rings with outer radii `edges_mm`; `count` is 1 to max_lobes.
 ///
-/// Least squares over the rings, which are logarithmic. Weights are the exact solution of the small quadratic problem
+/// Least squares over the rings, which are logarithmic, and over the mean radius, which decides how much light there is
+/// beyond a shadow's edge. Weights are the exact solution of the small quadratic problem
 /// "non-negative, energy kept". The widths start at fixed multiples of the profile's mean log radius, are improved by
 /// Levenberg-Marquardt and held near their start by a weak penalty: widths that the profile does not determine then
 /// do not wander, so that neighbouring skins get neighbouring lobes and a table of them may be interpolated.
