@@ -31,7 +31,7 @@ def _crown(width: float, height: float, thickness: float, cut: float) -> tuple[n
     round_ = power(np.cos(lat), 0.45)[:, None]
     z = power(np.sin(lat), 0.6)[:, None] * np.ones_like(lon)
     toward_edge = (z + 1) / 2
-    x = round_ * power(np.cos(lon), 0.62) * (0.40 + 0.10 * np.sqrt(toward_edge))
+    x = round_ * power(np.cos(lon), 0.62) * (0.445 + 0.075 * np.sqrt(toward_edge))
     y = round_ * power(np.sin(lon), 0.70) * (0.5 - cut * toward_edge**1.5)
     # What thins is the tongue side: the lip side of a crown stays nearly straight.
     y = y + cut * toward_edge**1.5 * 0.7
