@@ -163,7 +163,8 @@ def test_a_blink_closes_the_eye(head):
 
 
 def test_brows_stay_on_the_skin_in_every_key(head):
-    """A brow hair's root lies on the skin; wherever a key takes the skin, the root is still within a millimetre."""
+    """A brow hair's root lies on the skin; wherever a key takes the skin, a skin vertex (they are
+    2 to 4 mm apart there) is still as near."""
     skin, brows = head.part("skin"), head.part("brows")
     roots = np.arange(0, len(brows.vertices), 18 * 25)  # 3 sides, 6 points: every 25th hair
     refine = Subdivision(skin.faces, len(skin.vertices))

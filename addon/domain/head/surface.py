@@ -113,9 +113,6 @@ class Binding:
         """Interpolate per-vertex values (V, C) at the points."""
         return np.einsum("nk,nkc->nc", self.weight, values[self.index])
 
-    def __getitem__(self, rows) -> Binding:
-        return Binding(self.index[rows], self.weight[rows])
-
 
 def locate(points: np.ndarray, plane: np.ndarray, tris: np.ndarray, chunk: int = 512) -> Binding:
     """Tie 2-D points (N, 2) to the triangle of a flat map (V, 2) that holds them; outside, to the nearest rim.
