@@ -59,7 +59,7 @@ def set_stage(
     size: tuple[int, int] = (512, 640),
     lens_mm: float = 85.0,
     turn_deg: float = 0.0,
-    exposure: float = 0.0,
+    exposure: float = 0.3,
     lights: tuple[Light, ...] = LIGHTS,
     ambient: float = 0.045,
     backdrop: float = 0.16,
@@ -72,14 +72,17 @@ def set_stage(
     """
     eyes_, chin_, crown_ = Vector(eyes), Vector(chin), Vector(crown)
     head_height = crown_.z - chin_.z
-    middle = Vector((0, (eyes_.y + crown_.y) / 2, chin_.z + head_height * 0.37))
-    frame_height = head_height * 1.75
+    middle = Vector((0, (eyes_.y + crown_.y) / 2, chin_.z + head_height * 0.42))
+    frame_height = head_height * 1.6
 
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.film_transparent = False
-    scene.view_settings.view_transform = "AgX"
-    scene.view_settings.look = "AgX - Medium High Contrast"
+    try:
+        # Colours as they are: a film look would take from skin the very saturation that blood gives it.
+        scene.view_settings.view_transform = "Standard"
+    except TypeError:
+        pass  # a custom OCIO config without it: its own default view shows the picture
     scene.view_settings.exposure = exposure
 
     camera = bpy.data.objects.new("portrait_camera", bpy.data.cameras.new("portrait_camera"))

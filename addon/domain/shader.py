@@ -43,7 +43,7 @@ def assemble(plan: Plan) -> dict[str, Shader]:
         }
     shaders = {
         "chromophores": _assemble("chromophores", plan.fragments, defines),
-        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2)}),
+        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2), "RELIEF": int("relief" in active)}),
     }
     if any(fragment.stage == "relief" for fragment in plan.fragments):
         shaders["relief"] = _assemble("relief", plan.fragments, {})
