@@ -31,7 +31,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test native setup openimageio stub extension matrix clean system
+.PHONY: help demo test docs native setup openimageio stub extension matrix clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -50,6 +50,9 @@ setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything 
 native: $(NATIVE_STAMP) $(RUN_STAMP) ## Build the native wheel and install it into .venv
 
 openimageio: $(OIIO_STAMP) ## Fetch the libraries and headers of OpenImageIO
+
+docs: ## Write the pages that follow from the schema anew
+	$(PYTHON) tools/write_parameter_docs.py
 
 stub: native ## Write the committed stub of the native module anew
 	$(PY) -m nanobind.stubgen -m sanguine_core._core -o native/python/sanguine_core/_core.pyi
