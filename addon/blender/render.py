@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -74,11 +75,11 @@ def set_image(scene: bpy.types.Scene, image: Image) -> None:
     cycles.use_adaptive_sampling = False
     render.use_persistent_data = True  # one subject, many poses
     if image.view_transform:
-        views = scene.view_settings.bl_rna.properties["view_transform"]
         try:
             scene.view_settings.view_transform = image.view_transform
-        except TypeError:
-            known = [item.identifier for item in views.enum_items]
+        except TypeError as error:
+            # The list depends on the colour configuration; only this message has it.
+            known = re.findall(r"'([^']+)'", str(error).partition(" in ")[2])
             raise InputError(
                 f"image.view_transform: {image.view_transform!r} is not in this Blender, "
                 f"{nearest(image.view_transform, known)}"
@@ -103,6 +104,8 @@ def quiet() -> Iterator[None]:
         os.dup2(log.fileno(), 1)
         try:
             yield
+        except InputError:
+            raise  # one line says it all
         except BaseException:
             sys.stdout.flush()
             log.seek(0)
