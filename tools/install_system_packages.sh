@@ -5,7 +5,7 @@ set -eu
 
 python='python3 python3-dev python3-venv'
 compiler='g++ make'
-libraries='libfmt-dev libglm-dev libgtest-dev libimath-dev libopenexr-dev'
+libraries='libeigen3-dev libfmt-dev libglm-dev libgtest-dev libimath-dev libopenexr-dev'
 # Blender as a module opens no window, but its library is linked to these.
 blender='libgl1 libice6 libsm6 libx11-6 libxext6 libxfixes3 libxi6 libxkbcommon0 libxrender1'
 

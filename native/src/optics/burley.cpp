@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <Eigen/Dense>
+
 namespace sanguine {
 namespace {
 
@@ -29,34 +31,9 @@ constexpr double max_step = 0.5;     // of ln d
 constexpr double converged = 1e-3;   // of ln d: a step below this is the last
 
 using Vector = std::array<double, max_lobes>;
-using Matrix = std::array<std::array<double, max_lobes + 1>, max_lobes + 1>;
-using Right = std::array<double, max_lobes + 1>;
-
-/// Gaussian elimination with row pivoting, in place; false for a singular matrix.
-bool solve(Matrix& m, Right& b, int n) {
-    for (int c = 0; c < n; ++c) {
-        int pivot = c;
-        for (int r = c + 1; r < n; ++r)
-            if (std::fabs(m[r][c]) > std::fabs(m[pivot][c]))
-                pivot = r;
-        if (m[pivot][c] == 0)
-            return false;
-        std::swap(m[c], m[pivot]);
-        std::swap(b[c], b[pivot]);
-        for (int r = c + 1; r < n; ++r) {
-            const double factor = m[r][c] / m[c][c];
-            for (int k = c; k < n; ++k)
-                m[r][k] -= factor * m[c][k];
-            b[r] -= factor * b[c];
-        }
-    }
-    for (int r = n - 1; r >= 0; --r) {
-        for (int k = r + 1; k < n; ++k)
-            b[r] -= m[r][k] * b[k];
-        b[r] /= m[r][r];
-    }
-    return true;
-}
+/// Small systems without a heap: at most one row per lobe and one for the energy.
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_lobes + 1, max_lobes + 1>;
+using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_lobes + 1, 1>;
 
 /// The fit of one channel. Energies are in shares of their total, so weights add up to 1.
 class Fitter {
@@ -82,19 +59,17 @@ public:
         std::vector<double> trial_residual(share_.size());
         for (int i = 0; i < iterations; ++i) {
             differentiate(log_d);
-            Matrix normal{};
-            Right step{};
-            double trace = 0;
+            Matrix normal(count_, count_);
+            Column downhill(count_);
             for (int k = 0; k < count_; ++k) {
                 for (int l = 0; l < count_; ++l)
-                    normal[k][l] = dot(derivatives_[k], derivatives_[l]);
-                normal[k][k] += stiffness;
-                trace += normal[k][k];
-                step[k] = -dot(derivatives_[k], residual_) - stiffness * (log_d[k] - held[k]);
+                    normal(k, l) = dot(derivatives_[k], derivatives_[l]);
+                downhill[k] = -dot(derivatives_[k], residual_) - stiffness * (log_d[k] - held[k]);
             }
-            for (int k = 0; k < count_; ++k)
-                normal[k][k] += damping * trace;
-            if (!solve(normal, step, count_))
+            normal.diagonal().array() += stiffness;
+            normal.diagonal().array() += damping * normal.trace();
+            const Column step = normal.ldlt().solve(downhill);
+            if (!step.allFinite())
                 break;
 
             Vector trial = log_d;
@@ -171,16 +146,17 @@ private:
             for (int k = 0; k < count_; ++k)
                 if (set >> k & 1)
                     member[size++] = k;
-            Matrix kkt{};
-            Right w{};
+            Matrix kkt = Matrix::Zero(size + 1, size + 1);
+            Column right(size + 1);
             for (int i = 0; i < size; ++i) {
                 for (int j = 0; j < size; ++j)
-                    kkt[i][j] = gram_[member[i]][member[j]];
-                kkt[i][size] = kkt[size][i] = 1;
-                w[i] = target_[member[i]];
+                    kkt(i, j) = gram_[member[i]][member[j]];
+                kkt(i, size) = kkt(size, i) = 1;
+                right[i] = target_[member[i]];
             }
-            w[size] = 1;
-            if (!solve(kkt, w, size + 1) || *std::min_element(w.begin(), w.begin() + size) < 0)
+            right[size] = 1;
+            const Column w = kkt.partialPivLu().solve(right);
+            if (!w.allFinite() || w.head(size).minCoeff() < 0)
                 continue;
             double cost = 0;  // less the constant |profile|^2
             for (int i = 0; i < size; ++i) {
