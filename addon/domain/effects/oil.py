@@ -2,6 +2,7 @@
 
 import sanguine_core
 
+from ..film import ENTRIES, film_table
 from .effect import Activation, Effect, Fragment, Scene, ShaderInput
 
 
@@ -20,7 +21,12 @@ def _fragment(_scene: Scene) -> Fragment:
             ShaderInput("film", "float", "chromophores", "film"),
             ShaderInput("roughness", "float", "parameter", "roughness"),
         ),
-        defines={"FILM_IOR": f"{sanguine_core.OIL_FILM_INDEX}"},
+        defines={
+            "FILM_IOR": f"{sanguine_core.OIL_FILM_INDEX}",
+            "FILM_ENTRIES": f"{ENTRIES}",
+            "FILM_LENGTH": f"{ENTRIES * ENTRIES}",  # OSL wants a literal for the length of an array
+            "FILM_ALBEDO": ", ".join(f"{value:.5f}" for value in film_table(sanguine_core.OIL_FILM_INDEX).ravel()),
+        },
     )
 
 
