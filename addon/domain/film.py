@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 ENTRIES = 16
@@ -51,6 +53,7 @@ def fresnel(cosine: np.ndarray, index: float) -> np.ndarray:
     return 0.5 * np.square((g - cosine) / (g + cosine)) * (1.0 + ratio * ratio)
 
 
+@functools.cache
 def film_table(index: float) -> np.ndarray:
     """(ENTRIES, ENTRIES) albedo: rows by the root of the roughness, columns by the root of the cosine, each 0 to 1."""
     squares = np.linspace(0.0, 1.0, ENTRIES) ** 2
