@@ -87,6 +87,25 @@ def pixel_of(place: tuple[float, float, float]) -> tuple[int, int]:
     return int(at.x * scene.render.resolution_x), int(at.y * scene.render.resolution_y)
 
 
+def render_only(*seen: bpy.types.Object) -> None:
+    """Leave every other mesh and hair out of the picture: what would only shade the place that is measured."""
+    for thing in bpy.data.objects:
+        if thing.type in {"MESH", "CURVES"}:
+            thing.hide_render = thing not in seen
+
+
+def render_around(places: list[tuple[float, float, float]], margin: int) -> None:
+    """Render only the pixels within `margin` of the box around some places; the others stay black."""
+    render = bpy.context.scene.render
+    at = np.array([pixel_of(place) for place in places])
+    size = np.array([render.resolution_x, render.resolution_y])
+    low, high = (at.min(0) - margin) / size, (at.max(0) + margin + 1) / size
+    assert np.all(low >= 0.0) and np.all(high <= 1.0), "a place is out of the picture"
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_min_y = low.tolist()
+    render.border_max_x, render.border_max_y = high.tolist()
+
+
 def mean_around(pixels: np.ndarray, place: tuple[float, float, float], half: int) -> np.ndarray:
     """Mean colour of the square of 2 half + 1 pixels around a place."""
     x, y = pixel_of(place)
