@@ -1,0 +1,117 @@
+"""The add-on as Blender sees it: registers, refuses politely, applies and takes itself away."""
+
+import bpy
+import pytest
+import sanguine
+from sanguine.blender import operators, panels
+from sanguine.domain.effects.regions import FACE_REGIONS
+
+
+@pytest.fixture
+def addon():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    sanguine.register()
+    yield
+    sanguine.unregister()
+
+
+def grid(regions=FACE_REGIONS):
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=0.2)
+    face = bpy.context.object
+    for region in regions:
+        face.vertex_groups.new(name=f"sanguine_{region}").add([0, 1, 7], 1.0, "REPLACE")
+    return face
+
+
+class Layout:
+    """Stands in for Blender's layout, which exists only while a window draws: takes what a panel asks for."""
+
+    def __init__(self):
+        self.drawn = []
+
+    def operator(self, name, **_):
+        self.drawn.append(name)
+
+    def prop(self, data, name, **_):
+        # Blender draws an unknown property as an error in red: here it is one.
+        data.path_resolve(name)
+        self.drawn.append(name)
+
+    def label(self, text, **_):
+        self.drawn.append(text)
+
+    def column(self, **_):
+        return self
+
+
+def draw(panel):
+    layout = Layout()
+    panel.draw(type("Panel", (), {"layout": layout})(), bpy.context)
+    return layout.drawn
+
+
+def test_nothing_selected_is_refused_with_what_to_do(addon):
+    assert not bpy.ops.sanguine.apply_skin.poll()
+    with pytest.raises(RuntimeError, match="Select a face"):
+        bpy.ops.sanguine.apply_skin()
+
+
+def test_a_mesh_without_uvs_gives_one_line(addon):
+    face = grid()
+    while face.data.uv_layers:
+        face.data.uv_layers.remove(face.data.uv_layers[0])
+    with pytest.raises(RuntimeError, match="no UV map"):
+        bpy.ops.sanguine.apply_skin()
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+def test_apply_gives_material_sliders_and_panel(addon, engine):
+    bpy.context.scene.render.engine = engine
+    face = grid()
+    assert draw(panels.SANGUINE_PT_main) == ["sanguine.apply_skin"]
+    assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
+    assert bpy.context.scene.render.engine == engine
+    drawn = draw(panels.SANGUINE_PT_main)
+    assert {'["anger"]', '["happy"]', '["sad"]', '["fear"]', '["blood"]'} <= set(drawn)
+    assert {"melanin", "hemoglobin", "strength_relief"} <= set(draw(panels.SANGUINE_PT_skin))
+    assert any(line.startswith("Perfusion: ") for line in draw(panels.SANGUINE_PT_plan))
+    assert "sanguine" in face.material_slots[0].material
+    # The controls are found from the face and from the rig.
+    bpy.context.view_layer.objects.active = face.parent
+    assert operators.active_face(bpy.context) == face
+
+
+def test_face_keeps_its_place_when_it_gets_a_rig(addon):
+    face = grid()
+    face.location = (1.0, 2.0, 3.0)
+    face.rotation_euler = (0.1, 0.2, 0.3)
+    bpy.context.view_layer.update()
+    before = face.matrix_world.copy()
+    bpy.ops.sanguine.apply_skin()
+    bpy.context.view_layer.update()
+    for a, b in zip(before, face.matrix_world):
+        assert list(a) == pytest.approx(list(b), abs=1e-6)
+
+
+def test_two_faces_share_no_state(addon):
+    first = grid()
+    first.sanguine.melanin = 0.02
+    bpy.ops.sanguine.apply_skin()
+    second = grid()
+    second.sanguine.melanin = 0.2
+    bpy.ops.sanguine.apply_skin()
+    assert first.material_slots[0].material != second.material_slots[0].material
+    assert first.parent != second.parent
+
+    def melanin(face):
+        group = face.material_slots[0].material.node_tree.nodes[0]
+        return group.inputs["Melanin"].default_value
+
+    assert melanin(first) == pytest.approx(0.02) and melanin(second) == pytest.approx(0.2)
+
+
+def test_unregistering_leaves_nothing(addon):
+    sanguine.unregister()
+    assert not hasattr(bpy.types.Object, "sanguine")
+    assert not hasattr(bpy.types, "SANGUINE_PT_main")
+    sanguine.register()
