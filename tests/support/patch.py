@@ -11,6 +11,7 @@ import numpy as np
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from sanguine.blender.render import quiet, save_render
+from sanguine.domain.parameters import PARAMETERS, Skin
 
 
 def empty_scene(width: int, height: int, samples: int) -> bpy.types.Scene:
@@ -43,6 +44,14 @@ def plane(material: bpy.types.Material, half_mm: float = 100.0) -> bpy.types.Obj
     bpy.context.scene.collection.objects.link(patch)
     mesh.materials.append(material)
     return patch
+
+
+def set_sliders(material: bpy.types.Material, skin: Skin) -> None:
+    """Move the sliders of a live skin material as an artist would: one table serves every skin."""
+    (group,) = (node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup")
+    for key, value in skin.items():
+        if PARAMETERS[key].label in group.inputs:
+            group.inputs[PARAMETERS[key].label].default_value = value
 
 
 def camera_above(width_mm: float, tilt: float = 0.0) -> None:
