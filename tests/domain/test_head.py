@@ -10,7 +10,9 @@ import sanguine_core
 from sanguine.domain.errors import InputError
 from sanguine.domain.head import ARKIT_NAMES, HeadError, HeadPackage, build_head, load_presets, load_regions
 from sanguine.domain.head.bust import cut_bust
+from sanguine.domain.facs import shape_key_values
 from sanguine.domain.head.eyes import GAZE_M, fit_sphere
+from sanguine.domain.head.lips import BASE_LINE_M, near_lips, parting
 from sanguine.domain.head.surface import Subdivision, edges_of, locate
 from sanguine.domain.resources import rigs_path
 
@@ -162,6 +164,63 @@ def test_a_blink_closes_the_eye(head):
     assert opening(eyeBlinkLeft=1.0) < 0.45 * opening()
 
 
+@pytest.fixture(scope="module")
+def lip_gap(package):
+    """(head, emotions) -> how far the lips are apart in columns a millimetre wide, mm; below 0 they press."""
+    bust = cut_bust(package.base_mesh())
+    first = Subdivision(bust.faces, len(bust.source))
+    second = Subdivision(first.faces, int(first.faces.max()) + 1)
+    base = second(first(package.base_mesh().vertices[bust.source]))
+    near, lower = near_lips(base), base[:, 2] < BASE_LINE_M
+
+    def gap(head, **emotions):
+        fine = second(first(posed(head.part("skin"), **shape_key_values(emotions))))
+        columns, upper_z, lower_z = parting(fine, lower, near)
+        return columns, upper_z - lower_z
+
+    return gap
+
+
+def test_lips_meet_from_corner_to_corner_at_rest(head, lip_gap):
+    columns, gap = lip_gap(head)
+    inside = np.abs(columns) <= 17
+    assert np.isfinite(gap[inside]).all()
+    assert -0.8 < gap[inside].min() and gap[inside].max() < 0.0
+
+
+def test_a_smile_parts_the_lips_over_the_upper_teeth(head, lip_gap):
+    columns, half = lip_gap(head, happy=0.5)
+    _, whole = lip_gap(head, happy=1.0)
+    middle = np.abs(columns) <= 6
+    assert half[middle].max() < 4.0 and whole[middle].min() > 3.5
+    front = np.abs(columns) <= 15
+    np.testing.assert_allclose(whole[front], whole[front][::-1], atol=1.5)  # both sides alike
+
+
+def brow_ends(head, **emotions):
+    """Height of the brows' inner and outer quarter and the space between them, mm."""
+    hairs = posed(head.part("brows"), **shape_key_values(emotions)) * 1e3
+    left = hairs[hairs[:, 0] > 0]
+    near, far = np.quantile(left[:, 0], [0.25, 0.75])
+    return left[left[:, 0] < near, 2].mean(), left[left[:, 0] > far, 2].mean(), np.quantile(left[:, 0], 0.02)
+
+
+def test_anger_knits_the_brows_and_sadness_slants_them(head):
+    inner, outer, apart = brow_ends(head)
+    angry, sad = brow_ends(head, anger=1.0), brow_ends(head, sad=1.0)
+    assert angry[0] < inner - 6 and (angry[1] - angry[0]) - (outer - inner) > 3 and angry[2] < apart - 2
+    assert sad[0] > inner + 4 and (sad[0] - sad[1]) - (inner - outer) > 3
+
+
+def test_brows_never_cross_the_midline(head):
+    skin = head.part("skin")
+    for emotion in ("anger", "sad", "fear"):
+        moved = posed(skin, **shape_key_values({emotion: 1.0}))
+        near = (np.abs(skin.vertices[:, 0]) < 0.03) & (np.abs(skin.vertices[:, 0]) > 0.002)
+        near &= (skin.vertices[:, 2] > head.landmarks["nasion"][2] - 0.005) & (skin.vertices[:, 1] < head.landmarks["eyes"][1])
+        assert (moved[near, 0] * skin.vertices[near, 0] > 0).all(), emotion
+
+
 def test_brows_stay_on_the_skin_in_every_key(head):
     """A brow hair's root lies on the skin; wherever a key takes the skin, a skin vertex (they are
     2 to 4 mm apart there) is still as near."""
@@ -243,7 +302,7 @@ def test_a_target_outside_the_package_is_refused(package, tmp_path):
 @pytest.mark.parametrize(
     ("name", "change", "says"),
     [
-        ("heads.toml", ("eyeBlinkLeft", "eyeBlnkLeft"), "eyeBlinkLeft"),
+        ("heads.toml", ("eyeWideLeft", "eyeWydeLeft"), "eyeWideLeft"),
         ("heads.toml", ('style = "tied"', 'style = "mohawk"'), "hair.style"),
         ("heads.toml", ("pupil = ", "pupils = "), "eyes.pupil"),
         ("regions.toml", ('mask = "lips"', 'mask = "../lips"'), "mask"),

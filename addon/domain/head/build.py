@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import eyes, hair, strands, teeth
+from . import eyes, hair, lips, strands, teeth
 from .bust import SLOTS as SKIN_SLOTS
 from .bust import Bust, cut_bust, round_edge
 from .model import Head, MeshPart, shape_keys
@@ -15,6 +15,7 @@ from .package import ARKIT_NAMES, LICENCE, BaseMesh, HeadPackage
 from .presets import Preset
 from .regions import ImageReader, Region, region_weights
 from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
+from .units import mend
 
 TEAR_RADIUS_M = 0.00035  # the meniscus of tears is 0.2 to 0.5 mm high
 UNDERCOAT_M = 0.0004
@@ -69,6 +70,7 @@ class FineSkin:
 
 def shape(package: HeadPackage, preset: Preset) -> Person:
     base, units = package.base_mesh(), package.face_units()
+    mend(units, base.vertices)
     vertices = base.vertices.copy()
     for name, weight in preset.morphs.items():
         index, delta = package.morph(name)
@@ -236,9 +238,10 @@ def build_head(
     neck = person.vertices[person.base.vertices_of("joint-neck")].mean(axis=0)
     stand = np.float32([0, neck[1], person.vertices[bust.source, 2].min()])
     person.vertices[:] -= stand
+    base_skin = person.base.vertices[bust.source]
+    person.vertices[bust.source] += lips.seal(person.vertices[bust.source], base_skin, bust.faces)
     rng = np.random.default_rng(zlib.crc32(preset.id.encode()))  # the same head every time
 
-    base_skin = person.base.vertices[bust.source]
     skin = person.vertices[bust.source] + round_edge(bust, person.base)
     subdivide = Subdivision(bust.faces, len(skin))
     fine = refine(person, bust, skin, subdivide)
