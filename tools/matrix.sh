@@ -57,7 +57,8 @@ run_version() {
     venv=.venv-$version
     python=$venv/bin/python
     stamp=$venv/.installed-$(cat tools/requirements-*.txt addon/pyproject.toml tools/matrix.sh | sha256sum | cut -c1-16)
-    if [ ! -e "$stamp" ]; then
+    # The second question: a folder made inside Debian 13 has a Python that does not run outside, and the reverse.
+    if [ ! -e "$stamp" ] || ! $run "$python" -c '' 2>/dev/null; then
         rm -rf "$venv"
         $run "$base_python" -m venv "$venv"
         # The pins of the main environment, except bpy and NumPy: each Blender has its own generation of it.

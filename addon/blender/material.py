@@ -34,7 +34,8 @@ def build_skin_material(
     """A new material for `plan`. maps: map id -> (H, W, 3 or 4) float32, row 0 lowest, for each of `plan.maps`."""
     table = bake(plan.axes, plan.scene.skin, working_space(), progress)
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
+    if not material.node_tree:  # since Blender 5.0 there always is one
+        material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     group = tree.nodes.new("ShaderNodeGroup")

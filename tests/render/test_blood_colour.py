@@ -33,7 +33,8 @@ def white_patch(beside):
     card = bpy.data.objects.new("white", mesh)
     bpy.context.scene.collection.objects.link(card)
     material = bpy.data.materials.new("white")
-    material.use_nodes = True
+    if not material.node_tree:
+        material.use_nodes = True
     material.node_tree.nodes.clear()
     diffuse = material.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)

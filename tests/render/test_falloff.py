@@ -29,7 +29,8 @@ def edge_light():
     blade = bpy.data.objects.new("blade", mesh)
     blade.visible_camera = False
     black = bpy.data.materials.new("black")
-    black.use_nodes = True
+    if not black.node_tree:
+        black.use_nodes = True
     black.node_tree.nodes.clear()  # no surface: it only stops light
     emit = black.node_tree.nodes.new("ShaderNodeEmission")
     emit.inputs["Strength"].default_value = 0.0

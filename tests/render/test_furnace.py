@@ -41,18 +41,32 @@ SKINS = [
 ]
 
 
-def lab(rgb):
-    return colour.XYZ_to_Lab(colour.RGB_to_XYZ(np.asarray(rgb), "sRGB"), D65)
+# Working spaces of a file and what colour-science calls them. Before Blender 5.0 there is one.
+WORKING_SPACES = {"Linear Rec.709": "sRGB", "Linear Rec.2020": "ITU-R BT.2020", "ACEScg": "ACEScg"}
+HAS_WORKING_SPACES = hasattr(bpy.data, "colorspace")
+
+
+def lab(rgb, space="sRGB"):
+    xyz = colour.RGB_to_XYZ(np.asarray(rgb), space, D65, chromatic_adaptation_transform="Bradford")
+    return colour.XYZ_to_Lab(xyz, D65)
 
 
 def said(skin):
     return np.array(report(["skin"], [skin], np.array([550.0]))["results"][0]["linear_rec709"])
 
 
-def furnace_scene(skin, live, samples=64, tilt=0.0):
+def plan_of(skin, live=False):
+    return make_plan(Scene(skin, (Frame("0"),), live=live))
+
+
+def furnace_scene(skin, live, samples=64, tilt=0.0, space="Linear Rec.709"):
     """A flat patch of the skin in a white world; returns its material."""
-    white_world(empty_scene(32, 32, samples))
-    material = build_skin_material("patch", make_plan(Scene(skin, (Frame("0"),), live=live)), {})
+    scene = empty_scene(32, 32, samples)
+    if HAS_WORKING_SPACES and space != bpy.data.colorspace.working_space:
+        bpy.ops.wm.set_working_color_space(working_space=space, convert_colors=False)
+        assert bpy.data.colorspace.working_space == space
+    white_world(scene)
+    material = build_skin_material("patch", plan_of(skin, live), {})
     plane(material)
     camera_above(20.0, tilt)  # fits on the patch up to 84 degrees
     return material
@@ -96,6 +110,19 @@ def test_colour_of_the_table_is_what_skin_says():
     assert max(differences.values()) < 1.5, differences
 
 
+@pytest.mark.parametrize("live", [False, True], ids=["constant", "table"])
+@pytest.mark.parametrize("space", list(WORKING_SPACES) if HAS_WORKING_SPACES else ["Linear Rec.709"])
+def test_colour_in_every_working_space(space, live):
+    """The picture is in the file's own working space, and its colour the same, within the same bar."""
+    skin = default_skin() | SKINS[1] | {"oil": 0.0}
+    furnace_scene(skin, live, space=space)
+    mean, error = render_mean()
+    assert error < 1e-3
+    difference = colour.delta_E(lab(mean, WORKING_SPACES[space]), lab(said(skin)), method="CIE 2000")
+    print(f"{mean} in {space}: {difference:.3f}")
+    assert difference < 1.5
+
+
 def test_colour_on_a_curved_head():
     """The forehead of the example head, which sees little but the white world: Delta E 2000 within 1.5 too."""
     scene = empty_scene(96, 120, 128)
@@ -107,7 +134,7 @@ def test_colour_on_a_curved_head():
     differences = {}
     for changes in SKINS:
         skin = default_skin() | changes | {"oil": 0.0}
-        apply_skin(face.skin, face.rig, make_plan(Scene(skin, (Frame("0"),))))
+        apply_skin(face.skin, face.rig, plan_of(skin))
         mean = mean_around(render_linear(), face.landmarks["forehead"], 4)
         differences[skin["melanin"]] = colour.delta_E(lab(mean), lab(said(skin)), method="CIE 2000")
     print(differences)

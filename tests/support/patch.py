@@ -32,7 +32,8 @@ def empty_scene(width: int, height: int, samples: int) -> bpy.types.Scene:
 def white_world(scene: bpy.types.Scene) -> None:
     world = bpy.data.worlds.new("white")
     scene.world = world
-    world.use_nodes = True
+    if not world.node_tree:
+        world.use_nodes = True
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
 
 
