@@ -82,7 +82,7 @@ def eye(name: str, preset: Preset) -> bpy.types.Material:
     crypt = n.step(0.5, 0.68, n.noise(polar, 3.4, 2.0), out=(1.0, 0.6))
     wobble = n.math("ADD", r, n.math("MULTIPLY_ADD", n.noise(direction, 5.0), 0.24, -0.12))
     stroma = n.mix(n.step(preset.eyes.pupil, 0.74, wobble), preset.eyes.collarette, preset.eyes.iris)
-    shade = n.math("MULTIPLY", n.math("MULTIPLY", fibre, crypt), n.step(0.80, 1.02, r, out=(1.0, 0.25)))
+    shade = n.math("MULTIPLY", n.math("MULTIPLY", fibre, crypt), n.step(0.74, 1.0, r, out=(1.0, 0.12)))
     iris = n.mix(1.0, stroma, n.add("ShaderNodeCombineColor", shade, shade, shade), "MULTIPLY")
     iris = n.mix(n.step(preset.eyes.pupil - 0.03, preset.eyes.pupil + 0.03, r), (0.001, 0.001, 0.001), iris)
 

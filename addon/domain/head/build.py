@@ -18,7 +18,7 @@ from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
 from .units import mend
 
 TEAR_RADIUS_M = 0.00035  # the meniscus of tears is 0.2 to 0.5 mm high
-UNDERCOAT_M = 0.0004
+UNDERCOAT_M = (0.0004, 0.0022)  # over the scalp: at the hairline, and where hair is dense
 UPPER_LASHES = ("2", 130, 1.9)  # the card's name in hm08, lashes in each eye, length over the card's height
 LOWER_LASHES = ("1", 60, 1.0)
 
@@ -221,7 +221,8 @@ def _undercoat(fine: FineSkin, density: np.ndarray) -> MeshPart:
     haired = density[fine.faces].max(axis=1) > 0.02
     source, faces = np.unique(fine.faces[haired], return_inverse=True)
     faces = faces.reshape(-1, 4)
-    above = fine.vertices + vertex_normals(fine.vertices, fine.faces) * UNDERCOAT_M
+    thick = np.interp(density, [0, 1], UNDERCOAT_M)[:, None].astype(np.float32)
+    above = fine.vertices + vertex_normals(fine.vertices, fine.faces) * thick
     uv = np.stack([density, np.full_like(density, 0.5)], axis=-1)[source][faces]
     piece = (above[source], faces, fine.units[:, source])
     return _part("undercoat", ("undercoat",), [piece], uv, subdivision=1)

@@ -13,6 +13,7 @@ from .surface import scatter_on, smoothstep, triangles, unit, vertex_normals
 AXIS_BEHIND_EYES_MM = 70.0  # the vertical line about which the hairline's azimuth is counted
 KNOT_HEIGHT_MM = 12.0  # of tied hair, above the eyes
 KNOT_RADIUS_MM = 30.0
+TIED_DEPTH_MM = 3.0  # of swept hair, over the undercoat; deeper, its fewer-than-real hairs part into fuzz at the rim
 WHORL_HEIGHT_MM = 88.0  # of cropped hair, at the back of the crown
 
 
@@ -90,8 +91,8 @@ def _tied(hair: Hair, root: np.ndarray, skull: SkullRadius, eyes: np.ndarray, rn
     path = unit(path * (1 - pull) + path[owner] * pull + rng.normal(0, 0.004, (n, 1, 3)) * s[:, None])
     surface = skull(path)
     seat = np.linalg.norm(root - skull.centre, axis=1) - skull(d0)
-    height = (0.4 + 6.0 * depth[:, None] * smoothstep(0, 0.35, s)) * 1e-3
-    stray = rng.random(n) < 0.015
+    height = (0.4 + TIED_DEPTH_MM * depth[:, None] * smoothstep(0, 0.35, s)) * 1e-3
+    stray = rng.random(n) < 0.005
     height[stray] += (rng.uniform(1, 5, (stray.sum(), 1)) * np.sin(np.pi * s)) * 1e-3
     height[:, 0] = -4e-4
     return skull.centre + path * (surface + height + seat[:, None] * (1 - s) ** 4)[..., None]
