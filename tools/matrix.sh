@@ -56,9 +56,12 @@ run_version() {
     esac
     venv=.venv-$version
     python=$venv/bin/python
-    stamp=$venv/.installed-$(cat tools/requirements-*.txt addon/pyproject.toml tools/matrix.sh | sha256sum | cut -c1-16)
-    # The second question: a folder made inside Debian 13 has a Python that does not run outside, and the reverse.
-    if [ ! -e "$stamp" ] || ! $run "$python" -c '' 2>/dev/null; then
+    # The Python counts too: one inside Debian 13 does not run outside, nor the reverse.
+    stamp=$venv/.installed-$({
+        cat tools/requirements-*.txt addon/pyproject.toml tools/matrix.sh
+        echo "$run $base_python"
+    } | sha256sum | cut -c1-16)
+    if [ ! -e "$stamp" ]; then
         rm -rf "$venv"
         $run "$base_python" -m venv "$venv"
         # The pins of the main environment, except bpy and NumPy: each Blender has its own generation of it.

@@ -53,8 +53,7 @@ def predicted(skin, depth_mm):
     profile = profile_per_mm2(skin, radii_mm) * (2.0 * math.pi * radii_mm)[:, None]
     # A ring of radius r > depth has the share acos(depth / r) / pi of its length beyond the edge.
     share = np.arccos(np.clip(depth_mm[:, None] / radii_mm, -1.0, 1.0)) / math.pi
-    light = share[:, :, None] * profile
-    return (0.5 * (light[:, 1:] + light[:, :-1]) * np.diff(radii_mm)[:, None]).sum(axis=1)
+    return share @ (profile * np.gradient(radii_mm)[:, None])
 
 
 SKINS = [
