@@ -100,10 +100,12 @@ def _plan(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     from ..app.batch import render_batch
+    from ..domain.files import check_folder
     from ..domain.shot import jobs, read_shot
     from .progress import reporter
 
     shot = read_shot(options.shot)
+    check_folder(options.out)  # before Blender is loaded, which takes a second and may talk
     only = None
     if options.only is not None:
         only = [name for name in options.only.split(",") if name]

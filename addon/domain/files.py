@@ -104,6 +104,15 @@ def _models_in(annotation: Any) -> Iterator[type[pydantic.BaseModel]]:
         yield from _models_in(argument)
 
 
+def check_folder(path: str | os.PathLike[str]) -> None:
+    """Raises InputError if a file in the folder `path`, which need not exist yet, could not be written. Makes nothing."""
+    folder = Path(path).absolute()
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written: {folder} is not a folder that may be written to")
+
+
 @contextlib.contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path beside `path` (same suffix) and renames it over `path` on success.
