@@ -12,7 +12,7 @@ from ..domain.blood import ANATOMY, Rest
 from ..domain.effects import anatomy
 from ..domain.effects.regions import region_images
 
-# About 0.25 mm per texel on the example head: finer than the softness of any region but the lips' border.
+# About 0.8 mm per texel on the example head: finer than any region is soft, the border of the lips just so.
 DEFAULT_SIZE = 1024
 # Texels that repeat a UV island's edge outward, so that filtering never meets the background.
 _PADDING = 16
