@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..domain.effects import Frame, Scene
-from ..domain.errors import InputError
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
@@ -69,7 +68,7 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             driven = drive_shape_keys(rig, [child for child in (face, *rig.children) if child.type == "MESH"])
             plan = live_plan(face)
             apply_skin(face, rig, plan, skin_slot(face))
-        except (InputError, RuntimeError) as error:
+        except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         context.scene.cycles.shading_system = True
@@ -82,9 +81,12 @@ def _new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Ob
     """An armature for the controls of a face that has none; it does not deform anything."""
     rig = bpy.data.objects.new(f"{face.name} controls", bpy.data.armatures.new(f"{face.name} controls"))
     face.users_collection[0].objects.link(rig)
-    rig.matrix_world = face.matrix_world.copy()
+    world = face.matrix_world.copy()
+    rig.parent = face.parent
+    rig.matrix_world = world
     face.parent = rig
-    face.matrix_parent_inverse = rig.matrix_world.inverted()
+    context.view_layer.update()
+    face.matrix_world = world
     return rig
 
 

@@ -30,8 +30,8 @@ def apply_skin(
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
     if "rest_mm" in inputs:
         store_rest(face)
-    if face.data.materials:
-        face.data.materials[slot] = material
+    if face.material_slots:
+        face.material_slots[slot].material = material  # the slot knows whether it belongs to the object or the mesh
     else:
         face.data.materials.append(material)
     if armature is not None:

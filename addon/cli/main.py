@@ -135,8 +135,8 @@ def _wavelengths(text: str) -> Any:
             first, last, step = (float(part) for part in text.split(":"))
             if not step > 0 or not first <= last or (last - first) / step > 100_000:
                 raise ValueError
-            # Half a step of slack: 380:780:10 ends on 780 whatever the rounding.
-            values = np.arange(first, last + 0.5 * step, step)
+            # The slack lets 380:780:0.1 end on 780 whatever the rounding.
+            values = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
         else:
             values = np.array([float(part) for part in text.split(",")])
     except ValueError:

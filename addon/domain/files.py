@@ -44,7 +44,9 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Parsed TOML. Raises InputError with the line and column of a syntax fault."""
     try:
         return tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:  # syntax; or a number or a nesting beyond any sense
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
@@ -58,8 +60,10 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         return json.loads(read_text(path), parse_constant=no_constant)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}: not valid JSON: line {error.lineno}, column {error.colno}: {error.msg}") from None
-    except RecursionError:
-        raise InputError(f"{path}: not valid JSON: nested too deeply") from None
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:  # a number or a nesting beyond any sense
+        raise InputError(f"{path}: not valid JSON: {error}") from None
 
 
 def validate(model: type[Model], data: Any, where: str | os.PathLike[str]) -> Model:
@@ -133,7 +137,10 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
-        os.replace(temporary, target)
+        try:
+            os.replace(temporary, target)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written: {error.strerror}") from None
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -50,7 +50,7 @@ def default_skin() -> dict[str, float]:
 
 def check_value(parameter: Parameter, value: Any, where: str) -> float:
     """`value` as a float inside the hard range. Raises InputError naming `where`, the key and the range."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or isinstance(value, float) and not math.isfinite(value):
         raise InputError(f"{where}: {parameter.id}: {value!r} is not a number")
     if not parameter.hard_min <= value <= parameter.hard_max:
         unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""

@@ -177,6 +177,11 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
         raise InputError(f"{path}: timeline.last: {shot.timeline.last} is before the first frame, {shot.timeline.first}")
     if (count := _count(shot)) > _MAX_IMAGES:
         raise InputError(f"{path}: {count} images are more than the {_MAX_IMAGES} of one shot: split it")
+    taken = {"contact_sheet"}
+    for job in jobs(shot):
+        if job.id in taken:
+            raise InputError(f"{path}: expression: two pictures would be named '{job.id}': change an id")
+        taken.add(job.id)
     return shot
 
 
