@@ -34,7 +34,8 @@ class BlenderRenderer:
 
     def prepare(self, shot: Shot, subject: Subject, plan: Plan) -> None:
         with quiet():
-            bpy.ops.wm.read_factory_settings(use_empty=True)
+            # Not the factory's preferences: inside Blender they would switch off the add-on that is running.
+            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             scene = bpy.context.scene
             face = add_face(subject.rig.head)
             set_stage(

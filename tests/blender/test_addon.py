@@ -93,6 +93,19 @@ def test_face_keeps_its_place_when_it_gets_a_rig(addon):
         assert list(a) == pytest.approx(list(b), abs=1e-6)
 
 
+def test_face_keeps_the_parent_it_had(addon):
+    face = grid()
+    holder = bpy.data.objects.new("holder", None)
+    bpy.context.scene.collection.objects.link(holder)
+    face.parent = holder
+    holder.location = (1.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    bpy.ops.sanguine.apply_skin()
+    holder.location = (3.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    assert list(face.matrix_world.translation) == pytest.approx([3.0, 0.0, 0.0], abs=1e-6)
+
+
 def test_two_faces_share_no_state(addon):
     first = grid()
     first.sanguine.melanin = 0.02

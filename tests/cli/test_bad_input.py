@@ -47,6 +47,8 @@ def skin(tmp_path, data, *flags):
         ('{"skins": [}', ["not valid JSON", "line 1"]),
         ('{"skins": [{"melanin": NaN}]}', ["NaN"]),
         ("\ufeff{}", ["JSON"]),
+        ('{"skins": [{"melanin": 1' + "0" * 400 + "}]}", ["melanin", "outside"]),
+        ('{"skins": [{"melanin": 1' + "0" * 5000 + "}]}", ["not valid JSON"]),
     ],
     ids=lambda v: None if isinstance(v, list) else str(v)[:40],
 )
@@ -84,10 +86,11 @@ def test_unwritable_output(tmp_path):
         (lambda t: t.replace("anger = 1.0", "angre = 1.0"), ["angre", "did you mean 'anger'"]),
         (lambda t: t.replace("mottle = 0.6", "motle = 0.6"), ["motle", "did you mean 'mottle'"]),
         (lambda t: t.replace('id = "sad"', 'id = "fear"'), ["two have the id 'fear'"]),
+        (lambda t: t.replace('id = "sad"', 'id = "contact_sheet"'), ["two pictures", "contact_sheet"]),
         (lambda t: t.replace('id = "sad"', 'id = "../sad"'), ["expression.3.id", "file"]),
         (lambda t: t.replace('id = "sad"\n', ""), ["expression.3.id", "missing"]),
     ],
-    ids=["broken", "no-rig", "head", "unknown-key", "range", "skin-range", "over", "emotion", "effect", "twice", "path", "no-id"],
+    ids=["broken", "no-rig", "head", "unknown-key", "range", "skin-range", "over", "emotion", "effect", "twice", "taken", "path", "no-id"],
 )
 @pytest.mark.parametrize("verb", ["plan", "render"])
 def test_bad_shot(tmp_path, edit, words, verb):
