@@ -9,9 +9,9 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..domain.head import Head, MeshPart, Preset, StrandPart
+from .controls import CONTROL_BONE
 from .looks import looks
 
-CONTROL_BONE = "sanguine"
 NECK_BLEND_M = 0.05  # half the height over which the neck passes the head bone's turn on to the shoulders
 
 

@@ -26,12 +26,13 @@ class Shader:
 
 def assemble(plan: Plan) -> dict[str, Shader]:
     """Stage -> shader: "chromophores" and "surface", and "relief" when an active effect has a fragment for it."""
-    active = {effect.id for effect in plan.active}
+    stages = {fragment.stage for fragment in plan.fragments}
+    from_points = {item.key for f in plan.fragments for item in f.inputs if item.source == "chromophores"}
     axes = plan.axes
     defines = {
         "AXES": len(axes),
         "TABLE_HEIGHT": float(table_height(axes)),
-        "FILM": int("oil" in active),
+        "FILM": int("film" in from_points),
     }
     for i, axis in enumerate(axes):
         defines |= {
@@ -43,9 +44,9 @@ def assemble(plan: Plan) -> dict[str, Shader]:
         }
     shaders = {
         "chromophores": _assemble("chromophores", plan.fragments, defines),
-        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2), "RELIEF": int("relief" in active)}),
+        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2), "RELIEF": int("relief" in stages)}),
     }
-    if any(fragment.stage == "relief" for fragment in plan.fragments):
+    if "relief" in stages:
         shaders["relief"] = _assemble("relief", plan.fragments, {})
     return shaders
 
