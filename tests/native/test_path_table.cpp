@@ -59,16 +59,15 @@ Direct trace(double tau, double a1, double a2, int photons) {
 
 TEST(PathTable, ReferenceCaseUnderDiffuseLight) {
     // p13: measured difference of the total 0.10 %, of the rings 0.5 % in L1; table and reference have 0.1 % of noise.
-    const auto& c = *std::find_if(std::begin(reference::cases), std::end(reference::cases),
-                                  [](const auto& x) { return std::string(x.id) == "p13"; });
+    const reference::Case& c = reference::find("p13");
     const double mu_s_prime = c.layers[0].mu_s * (1 - c.layers[0].g), unit = 1 / mu_s_prime;
     Energies energy;
     const double total = solve(c.layers[0].thickness / unit, c.layers[0].mu_a * unit, c.layers[1].mu_a * unit, energy);
     EXPECT_NEAR(total / c.scattered_reflectance, 1, 0.004);
 
     const RadialProfile profile(energy, unit);
-    double l1 = std::fabs(profile.energy_within(reference::p13_rings[0].inner) - reference::p13_below_first_ring);
-    for (const reference::Ring& ring : reference::p13_rings)
+    double l1 = std::fabs(profile.energy_within(c.rings[0].inner) - c.below_first_ring);
+    for (const reference::Ring& ring : c.rings)
         l1 += std::fabs(profile.energy_within(ring.outer) - profile.energy_within(ring.inner) - ring.fraction);
     EXPECT_LT(l1 / c.scattered_reflectance, 0.015);
 }

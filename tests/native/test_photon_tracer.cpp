@@ -50,19 +50,19 @@ TEST_P(TracerAgainstReference, TotalsWithinFourStandardErrors) {
     EXPECT_NEAR(t.transmitted, c.transmittance, 4 * se_t);
 }
 
-INSTANTIATE_TEST_SUITE_P(Public, TracerAgainstReference, testing::ValuesIn(reference::cases),
+INSTANTIATE_TEST_SUITE_P(Public, TracerAgainstReference, testing::ValuesIn(reference::cases()),
                          [](const auto& case_of) { return case_of.param.id; });
 
 TEST(PhotonTracer, GiovanelliHalfSpace) {
     // Giovanelli 1955: albedo 0.9, isotropic, n = 1.5, normal incidence: 0.26 in all, surface 0.04 included.
     constexpr int photons = 300000;
-    const Totals t = trace({{0.1, 0.9, 0, 1.5, reference::half_space}}, Incidence::normal, photons, 1);
+    const Totals t = trace({{0.1, 0.9, 0, 1.5, half_space}}, Incidence::normal, photons, 1);
     EXPECT_NEAR(t.reflected_scattered + t.at_surface, 0.2600, 4 * standard_error(0.26, photons));
 }
 
 TEST(PhotonTracer, SurfaceReflectionIsFresnel) {
     constexpr int photons = 400000;
-    const std::vector<Layer> black = {{1000, 1, 0, 1.4, reference::half_space}};
+    const std::vector<Layer> black = {{1000, 1, 0, 1.4, half_space}};
     double cos_t;
     const double normal = fresnel_dielectric(1, 1, 1.4, cos_t), diffuse = diffuse_fresnel(1.4);
     EXPECT_NEAR(trace(black, Incidence::normal, photons, 2).at_surface, normal, 4 * standard_error(normal, photons));
@@ -79,7 +79,7 @@ TEST(PhotonTracer, ClearLayersOnlyRefract) {
 }
 
 TEST(PhotonTracer, PathsAddUpAndRadiusIsReached) {
-    const std::vector<Layer> stack = {{0.01, 5, 0.8, 1.4, 0.6}, {0.01, 2.5, 0.8, 1.4, reference::half_space}};
+    const std::vector<Layer> stack = {{0.01, 5, 0.8, 1.4, 0.6}, {0.01, 2.5, 0.8, 1.4, half_space}};
     int left = 0;
     for (int p = 0; p < 2000; ++p) {
         PhotonRandom random(5, p);

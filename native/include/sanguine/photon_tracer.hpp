@@ -6,16 +6,9 @@
 #include <cstdint>
 #include <span>
 
-namespace sanguine {
+#include "sanguine/stack.hpp"
 
-/// One plane, homogeneous layer. Any unit of length does as long as all fields use the same one.
-struct Layer {
-    double mu_a;       ///< absorption coefficient [1/length]
-    double mu_s;       ///< scattering coefficient [1/length]
-    double g;          ///< Henyey-Greenstein asymmetry, -1 < g < 1
-    double n;          ///< refractive index
-    double thickness;  ///< [length]; infinity for a half-space, which only the last layer can be
-};
+namespace sanguine {
 
 /// PCG-XSH-RR 64/32 (O'Neill 2014). Every photon has its own sequence, a pure function of (seed, photon): the
 /// result does not depend on which thread traces it.
@@ -46,14 +39,7 @@ private:
     std::uint64_t state_, increment_;
 };
 
-enum class Incidence {
-    normal,   ///< a pencil beam along the axis
-    diffuse,  ///< Lambertian light that falls on one point
-};
-
 enum class Fate { absorbed, reflected_at_surface, left_top, left_bottom };
-
-inline constexpr int max_layers = 8;
 
 /// What became of one photon.
 struct PhotonEnd {

@@ -8,8 +8,6 @@
 namespace sanguine {
 namespace {
 
-constexpr double outside_index = 1.0;
-
 struct Vector {
     double x, y, z;
 };
