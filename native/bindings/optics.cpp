@@ -1,14 +1,13 @@
 // Skin optics: coefficients, reflectance, profiles, colour, lobes.
 #include <cmath>
-#include <optional>
 #include <variant>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 
+#include "arrays.hpp"
 #include "counters.hpp"
 #include "sanguine/burley.hpp"
 #include "sanguine/chromophores.hpp"
@@ -27,16 +26,6 @@ using TableIn = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device:
 using ColoursIn = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using MatrixIn = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using SpaceIn = std::variant<std::string, MatrixIn>;
-template <int dimensions> using ArrayOut = nb::ndarray<nb::numpy, double, nb::ndim<dimensions>>;
-using ProgressIn = std::optional<nb::callable>;
-
-/// The array owns the values from here on.
-template <int dimensions>
-ArrayOut<dimensions> to_numpy(std::vector<double> values, const std::array<std::size_t, dimensions>& shape) {
-    auto* held = new std::vector<double>(std::move(values));
-    nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-    return ArrayOut<dimensions>(held->data(), dimensions, shape.data(), owner);
-}
 
 std::span<const double> view(const VectorIn& values) {
     return {values.data(), values.size()};
@@ -55,16 +44,6 @@ Matrix3 rgb_matrix(const SpaceIn& space) {
         return rgb_from_xyz(*name);
     const double* m = std::get<MatrixIn>(space).data();
     return {{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}}};
-}
-
-/// Called without the GIL, by the thread that came from Python. Also lets Ctrl-C through.
-Progress with_gil(const ProgressIn& callable) {
-    return [&callable](std::size_t done, std::size_t total) {
-        nb::gil_scoped_acquire gil;
-        if (PyErr_CheckSignals() != 0)
-            throw nb::python_error();
-        return !callable || nb::cast<bool>((*callable)(done, total));
-    };
 }
 
 nb::list parameters() {
