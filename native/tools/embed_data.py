@@ -11,6 +11,7 @@ from pathlib import Path
 # File, accessor in src/optics/embedded_data.hpp, columns.
 SPECTRA = (
     ("hemoglobin.csv", "embedded_hemoglobin", 3),
+    ("bilirubin.csv", "embedded_bilirubin", 2),
     ("cie_1931_2_degree.csv", "embedded_colour_matching", 4),
     ("cie_d65.csv", "embedded_illuminant_d65", 2),
 )

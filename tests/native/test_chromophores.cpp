@@ -61,7 +61,7 @@ TEST(Parameters, MessageNamesValueAndRange) {
     row[2] = 0.3;
     EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: hemoglobin: 0.3 is outside 0 to 0.25");
     row.pop_back();
-    EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: 6 values, needs 7");
+    EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: 9 values, needs 10");
 }
 
 TEST(Chromophores, MelaninAndBaseline) {
@@ -112,6 +112,72 @@ TEST(Chromophores, MixtureOfTheLayers) {
     EXPECT_EQ(o.mu_s_prime_dermis, o.mu_s_prime_epidermis / 2);
 }
 
+TEST(Chromophores, ScatterScaleMultipliesBothLayers) {
+    SkinParameters skin;
+    skin.scatter_scale = 1.5;
+    const Chromophores c = chromophores_at(600);
+    const OpticalCoefficients o = optical_coefficients(skin, c), plain = optical_coefficients({}, c);
+    EXPECT_EQ(o.mu_s_prime_epidermis, 1.5 * c.epidermis_scattering);
+    EXPECT_EQ(o.mu_s_prime_dermis, o.mu_s_prime_epidermis / 2);
+    EXPECT_EQ(o.mu_a_epidermis, plain.mu_a_epidermis);
+    EXPECT_EQ(o.mu_a_dermis, plain.mu_a_dermis);
+}
+
+TEST(Chromophores, VesselsPackTheirBlood) {
+    // Factors of pure oxygenated blood by hand from the same table, mu_a = 280.1, 28.54, 29.52, 1.71 1/mm; the last
+    // digit is the tolerance.
+    const struct { double radius_mm, nm, factor; } rows[] = {
+        {0.005, 415, 0.335}, {0.005, 542, 0.870}, {0.005, 577, 0.866}, {0.005, 600, 0.991},
+        {0.010, 415, 0.178}, {0.010, 542, 0.762}, {0.020, 577, 0.586}, {0.050, 415, 0.036},
+    };
+    for (const auto& row : rows) {
+        SkinParameters skin;
+        skin.hemoglobin = 0.02;
+        skin.oxygenation = 1;
+        const Chromophores c = chromophores_at(row.nm);
+        const double even = optical_coefficients(skin, c).mu_a_dermis;
+        skin.vessel_radius_mm = row.radius_mm;
+        const double packed = optical_coefficients(skin, c).mu_a_dermis;
+        EXPECT_NEAR(1 + (packed - even) / (0.02 * c.oxyhemoglobin), row.factor, 0.0015) << row.nm;
+    }
+    // The limit of thin vessels is the blood spread evenly.
+    SkinParameters thin;
+    thin.vessel_radius_mm = 1e-12;
+    const Chromophores c = chromophores_at(415);
+    EXPECT_NEAR(optical_coefficients(thin, c).mu_a_dermis / optical_coefficients({}, c).mu_a_dermis, 1, 1e-8);
+}
+
+TEST(Chromophores, BilirubinIsYellow) {
+    // 54,889 1/cm per mol/L at 450 nm (PhotochemCAD): ln(10) * 5488.9e-6 1/mm per umol/L. Red light passes.
+    EXPECT_NEAR(chromophores_at(450).bilirubin, 0.012639, 1e-6);
+    EXPECT_LT(chromophores_at(550).bilirubin, 2e-3 * chromophores_at(450).bilirubin);
+    for (double nm = 380; nm <= 780; nm += 0.5)
+        EXPECT_GE(chromophores_at(nm).bilirubin, 0) << nm;
+    EXPECT_EQ(chromophores_at(780).bilirubin, 0);
+    SkinParameters skin;
+    skin.bilirubin_umol_per_l = 100;
+    const Chromophores c = chromophores_at(450);
+    const OpticalCoefficients o = optical_coefficients(skin, c), plain = optical_coefficients({}, c);
+    EXPECT_NEAR(o.mu_a_dermis - plain.mu_a_dermis, 100 * c.bilirubin, 1e-12);
+    EXPECT_EQ(o.mu_a_epidermis, plain.mu_a_epidermis);
+}
+
+TEST(Chromophores, WhatIsOffCostsNothing) {
+    int calls = 0;
+    const auto counted = [&](double x) { ++calls; return std::expm1(x); };
+    SkinParameters skin;
+    const Chromophores c = chromophores_at(550);
+    const OpticalCoefficients off = optical_coefficients(skin, c, counted);
+    EXPECT_EQ(calls, 0);
+    skin.vessel_radius_mm = 0.01;
+    optical_coefficients(skin, c, counted);
+    EXPECT_EQ(calls, 1);
+    // And to the last bit the skin of Donner and Jensen.
+    EXPECT_EQ(off.mu_a_dermis, skin.hemoglobin * std::lerp(c.deoxyhemoglobin, c.oxyhemoglobin, skin.oxygenation)
+                                   + (1 - skin.hemoglobin) * c.baseline);
+    EXPECT_EQ(off.mu_s_prime_epidermis, c.epidermis_scattering);
+}
+
 TEST(Chromophores, WavelengthsOutsideTheTablesAreAnError) {
     EXPECT_EQ(message_of([] { chromophores_at(379); }), "wavelengths_nm: 379 is outside 380 to 780 nm");
     EXPECT_NE(message_of([] { chromophores_at(781); }), "");
@@ -121,13 +187,17 @@ TEST(Chromophores, WavelengthsOutsideTheTablesAreAnError) {
 
 TEST(Chromophores, EverySkinFitsThePathTable) {
     // Least absorption and greatest optical thickness of the hard ranges.
+    const auto row = [](std::string_view id) {
+        return *std::find_if(std::begin(parameter_rows), std::end(parameter_rows),
+                             [&](const auto& p) { return p.id == id; });
+    };
+    const double most_scattering = row("scatter_scale").hard_max;
+    const double thickest = row("epidermis_thickness_mm").hard_max;
     for (double nm = 380; nm <= 780; nm += 1) {
         const Chromophores c = chromophores_at(nm);
         const double least = std::min({c.baseline, c.eumelanin, c.pheomelanin, c.oxyhemoglobin, c.deoxyhemoglobin});
-        EXPECT_GE(least / c.epidermis_scattering, path_grid::reference_absorption) << nm;
-        const auto thickest = std::find_if(std::begin(parameter_rows), std::end(parameter_rows),
-                                           [](const auto& p) { return p.id == "epidermis_thickness_mm"; });
-        EXPECT_LE(thickest->hard_max * c.epidermis_scattering, path_grid::max_thickness) << nm;
+        EXPECT_GE(least / (most_scattering * c.epidermis_scattering), path_grid::reference_absorption) << nm;
+        EXPECT_LE(thickest * most_scattering * c.epidermis_scattering, path_grid::max_thickness) << nm;
     }
 }
 

@@ -11,7 +11,10 @@ EFFECT = Effect(
     id="scattering",
     label="Scattering",
     help="Light that enters the skin, scatters in both layers and leaves at a distance.",
-    reads=("melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm"),
+    reads=(
+        "melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm", "scatter_scale",
+        "vessel_radius_mm", "bilirubin_umol_per_l",
+    ),
     writes=(),
     activate=_activate,
     fragment=lambda scene: None,  # it is the fixed code of both shaders

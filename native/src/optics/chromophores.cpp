@@ -1,7 +1,7 @@
 #include "sanguine/chromophores.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
@@ -12,10 +12,26 @@
 namespace sanguine {
 namespace {
 
+static_assert(dermis_per_epidermis_scattering == path_grid::dermis_scattering, "the path table fixes this ratio");
+
 constexpr double hemoglobin_g_per_l = 150, hemoglobin_g_per_mol = 64500;  // whole blood; the tetramer (Prahl)
 
-/// Absorption of blood [1/mm] per molar extinction [1/cm per mol/L], base 10.
-constexpr double blood_per_extinction = std::numbers::ln10 * hemoglobin_g_per_l / hemoglobin_g_per_mol / 10;
+/// Absorption [1/mm] per molar extinction [1/cm per mol/L], base 10, of one mol/L.
+constexpr double absorption_per_extinction = std::numbers::ln10 / 10;
+
+/// Columns of a table of spectra at `nm`, linear between its rows. `nm` lies inside the table.
+template <int columns> std::array<double, columns - 1> lookup(SpectralRows<columns> table, double nm) {
+    const auto upper = std::clamp<std::ptrdiff_t>(
+        std::upper_bound(table.begin(), table.end(), nm, [](double x, const auto& row) { return x < row[0]; })
+            - table.begin(), 1, std::ssize(table) - 1);
+    const auto& a = table[upper - 1];
+    const auto& b = table[upper];
+    const double t = (nm - a[0]) / (b[0] - a[0]);
+    std::array<double, columns - 1> out;
+    for (int c = 1; c < columns; ++c)
+        out[c - 1] = std::lerp(a[c], b[c], t);
+    return out;
+}
 
 }  // namespace
 
@@ -26,34 +42,20 @@ Chromophores chromophores_at(double nm) {
                 << max_wavelength_nm << " nm";
         throw std::invalid_argument(message.str());
     }
-    const auto table = embedded_hemoglobin();
-    const auto upper = std::clamp<std::ptrdiff_t>(
-        std::upper_bound(table.begin(), table.end(), nm, [](double x, const auto& row) { return x < row[0]; })
-            - table.begin(), 1, std::ssize(table) - 1);
-    const auto& a = table[upper - 1];
-    const auto& b = table[upper];
-    const double t = (nm - a[0]) / (b[0] - a[0]);
+    constexpr double blood = absorption_per_extinction * hemoglobin_g_per_l / hemoglobin_g_per_mol;
+    const auto [oxy, deoxy] = lookup(embedded_hemoglobin(), nm);
+    const auto bilirubin = embedded_bilirubin();
 
     Chromophores c;
-    c.oxyhemoglobin = blood_per_extinction * std::lerp(a[1], b[1], t);
-    c.deoxyhemoglobin = blood_per_extinction * std::lerp(a[2], b[2], t);
+    c.oxyhemoglobin = blood * oxy;
+    c.deoxyhemoglobin = blood * deoxy;
     c.eumelanin = 6.6e10 * std::pow(nm, -3.33);
     c.pheomelanin = 2.9e14 * std::pow(nm, -4.75);
     c.baseline = 0.0244 + 8.53 * std::exp(-(nm - 154) / 66.2);
+    c.bilirubin = nm < bilirubin.back()[0] ? absorption_per_extinction * 1e-6 * lookup(bilirubin, nm)[0] : 0;
     // In 1/mm, twice the fit of Bashkatov et al. 2005 to whole skin; read as 1/cm it is ten times too small.
     c.epidermis_scattering = 14.74 * std::pow(nm, -0.22) + 2.2e11 * std::pow(nm, -4);
     return c;
-}
-
-OpticalCoefficients optical_coefficients(const SkinParameters& skin, const Chromophores& pure) {
-    return {
-        skin.melanin * std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend)
-            + (1 - skin.melanin) * pure.baseline,
-        skin.hemoglobin * std::lerp(pure.deoxyhemoglobin, pure.oxyhemoglobin, skin.oxygenation)
-            + (1 - skin.hemoglobin) * pure.baseline,
-        pure.epidermis_scattering,
-        path_grid::dermis_scattering * pure.epidermis_scattering,
-    };
 }
 
 }  // namespace sanguine

@@ -11,6 +11,7 @@ namespace sanguine {
 template <int columns> using SpectralRows = std::span<const double[columns]>;
 
 SpectralRows<3> embedded_hemoglobin();          ///< nm, molar extinction of HbO2 and of Hb [1/cm per mol/L]
+SpectralRows<2> embedded_bilirubin();           ///< nm, molar extinction [1/cm per mol/L]; 0 beyond
 SpectralRows<4> embedded_colour_matching();     ///< nm, x, y, z
 SpectralRows<2> embedded_illuminant_d65();      ///< nm, relative power
 std::span<const std::uint8_t> embedded_path_table();

@@ -35,7 +35,9 @@ constexpr std::size_t max_group = 32;
 /// Skins of a group differ in their epidermal absorption alone.
 std::vector<std::vector<std::size_t>> group_by_dermis(std::span<const SkinParameters> skins) {
     const auto key = [&](std::size_t i) {
-        return std::tuple(skins[i].epidermis_thickness_mm, skins[i].hemoglobin, skins[i].oxygenation);
+        const SkinParameters& s = skins[i];
+        return std::tuple(s.epidermis_thickness_mm, s.scatter_scale, s.hemoglobin, s.oxygenation, s.vessel_radius_mm,
+                          s.bilirubin_umol_per_l);
     };
     std::vector<std::size_t> order(skins.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
