@@ -93,6 +93,64 @@ TEST(PhotonTracer, PathsAddUpAndRadiusIsReached) {
     EXPECT_GT(left, 900);
 }
 
+TEST(WeightedWalk, ExpectsWhatTheAnalogWalkExpects) {
+    // Layers that meet every rule of the walk: a top that hardly scatters and absorbs, an opaque and a high-index one with
+    // light held in it, a last one of low albedo; and a clear one on glass. Four standard errors: fixed seeds.
+    const std::vector<std::vector<Layer>> stacks = {
+        {{2, 0.1, 0.8, 1.5, 0.3}, {3, 20, 0.8, 1.4, 0.05}, {0.1, 2, -0.5, 2.5, 0.4}, {5, 2, 0, 1.2, 0.3}},
+        {{0, 0, 0, 1.3, 0.1}, {0.01, 1, 0.5, 3, 0.2}, {0.5, 0, 0, 1.5, half_space}},
+    };
+    constexpr int photons = 100000;
+    for (const std::vector<Layer>& stack : stacks)
+        for (const Incidence incidence : {Incidence::normal, Incidence::diffuse}) {
+            const Totals analog = trace(stack, incidence, photons, 21);
+            const WeightedWalk walk(stack, incidence);
+            double R = 0, R2 = 0, T = 0, T2 = 0;
+            for (int p = 0; p < photons; ++p) {
+                const WeightedEnd end = walk.trace(22, p);
+                const double top = end.exit == WeightedEnd::Exit::top ? end.weight : 0;
+                const double bottom = end.unscattered_bottom
+                                    + (end.exit == WeightedEnd::Exit::bottom ? end.weight : 0);
+                R += top / photons;
+                R2 += top * top / photons;
+                T += bottom / photons;
+                T2 += bottom * bottom / photons;
+            }
+            const double se_R = std::sqrt((R2 - R * R) / photons), se_T = std::sqrt((T2 - T * T) / photons);
+            EXPECT_NEAR(R, analog.reflected_scattered,
+                        4 * std::hypot(se_R, standard_error(analog.reflected_scattered, photons)));
+            EXPECT_NEAR(T, analog.transmitted, 4 * std::hypot(se_T, standard_error(analog.transmitted, photons)));
+            EXPECT_LT(se_R, standard_error(analog.reflected_scattered, photons));
+        }
+}
+
+TEST(WeightedWalk, StopsAtItsCap) {
+    const WeightedWalk walk(std::vector<Layer>{{0, 1, 0, 1.4, half_space}}, Incidence::normal, 100);
+    int cut = 0;
+    for (int p = 0; p < 1000; ++p) {
+        const WeightedEnd end = walk.trace(1, p);
+        EXPECT_LE(end.collisions, 101u);
+        cut += end.exit == WeightedEnd::Exit::cut;
+        EXPECT_NEAR(end.weight, 1 - 1.0 / 36, 1e-12);  // it comes back, or is cut off: nothing absorbs
+    }
+    EXPECT_GT(cut, 50);
+    EXPECT_LT(cut, 500);
+}
+
+TEST(WeightedWalk, SurfaceReflectanceIsSmoothInTheIndex) {
+    // The closed form and the sum meet at 1.01; below, reflection falls without a jump to 0 at 1.
+    EXPECT_NEAR(surface_reflectance(1.0099999, Incidence::diffuse) / surface_reflectance(1.0100001, Incidence::diffuse), 1,
+                1e-3);
+    double last = surface_reflectance(1.02, Incidence::diffuse);
+    for (const double n : {1.009, 1.001, 1.0001, 1 + 1e-7, 1 + 1e-12}) {
+        const double share = surface_reflectance(n, Incidence::diffuse);
+        EXPECT_LT(share, last) << n;
+        EXPECT_GE(share, 0) << n;
+        last = share;
+    }
+    EXPECT_EQ(surface_reflectance(1, Incidence::diffuse), 0);
+}
+
 TEST(PhotonRandom, IsAFunctionOfSeedAndPhoton) {
     PhotonRandom a(1, 2), b(1, 2), other_photon(1, 3), other_seed(2, 2);
     const double first = a.uniform();
