@@ -50,6 +50,18 @@ def _parser() -> argparse.ArgumentParser:
                       help="nm, a range or a list with commas (default %(default)s)")
     skin.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    solve = _verb(verbs, "solve", _solve, "what becomes of light in stacks of layers, by a solver of your choice")
+    solve.add_argument("cases", metavar="CASES.json")
+    solve.add_argument("--solver", default="auto", metavar="NAME",
+                       help="auto, skin, multipole, adding-doubling or monte-carlo (default %(default)s)")
+    solve.add_argument("--tolerance", type=_share, default=0.01, metavar="X",
+                       help="relative error of the totals that is good enough (default %(default)s)")
+    solve.add_argument("--radii", metavar="MM,…", help="where the profile is wanted, for cases that do not say; "
+                       "'none' for totals alone (default 40 radii from 0.011 to 18.2 mm)")
+    solve.add_argument("--max-seconds", type=_positive, default=60.0, metavar="S",
+                       help="per case; a solver that stops early says so (default %(default)s)")
+    solve.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     plan = _verb(verbs, "plan", _plan, "what a shot will simulate, and why, without doing it")
     plan.add_argument("shot", metavar="SHOT.toml")
     plan.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
@@ -89,6 +101,22 @@ def _skin(options: argparse.Namespace) -> int:
     return 0
 
 
+def _solve(options: argparse.Namespace) -> int:
+    from ..app.solving import answer, check_solver, read_cases
+    from .progress import reporter
+
+    radii_mm = None if options.radii is None else _radii(options.radii)
+    check_solver(options.solver)
+    cases = read_cases(options.cases)
+    with reporter(options.json_progress) as progress:
+        report = answer(cases, options.solver, options.tolerance, radii_mm, options.max_seconds, progress)
+    _answer(report, options.out)
+    unsolved = [result for result in report["results"] if result["error"] is not None]
+    for result in unsolved:
+        print(f"sanguine: {options.cases}: {result['id']}: {result['error']}", file=sys.stderr)
+    return 1 if unsolved else 0
+
+
 def _plan(options: argparse.Namespace) -> int:
     from ..app.planning import plan_report
     from ..domain.effects.regions import FACE_REGIONS
@@ -125,6 +153,32 @@ def _render(options: argparse.Namespace) -> int:
         render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
                      progress=progress)
     return 0
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0 and at most 1")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
+    return value
+
+
+def _radii(text: str) -> list[float]:
+    if text == "none":
+        return []
+    try:
+        radii = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"--radii: {text!r} is not a list of millimetres like 0.1,1,10, or none") from None
+    if not all(0.0 < a < b for a, b in zip([1e-300, *radii], [*radii, float("inf")])):
+        raise InputError(f"--radii: {text!r} does not rise from above 0 mm")
+    return radii
 
 
 def _wavelengths(text: str) -> Any:

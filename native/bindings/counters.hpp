@@ -14,9 +14,12 @@ struct Counters {
     Counter spectral_solves{"spectral_solves"};      ///< reflectances: skins x wavelengths
     Counter profile_solves{"profile_solves"};        ///< radial profiles: skins x wavelengths
     Counter lobe_fits{"lobe_fits"};                  ///< fits: skins x channels
+    Counter stack_solves{"stack_solves"};            ///< layered stacks, whatever the solver
     Counter texels_rasterized{"texels_rasterized"};  ///< pixels of drawn maps, each channel once
 
-    std::array<Counter*, 4> all() { return {&spectral_solves, &profile_solves, &lobe_fits, &texels_rasterized}; }
+    std::array<Counter*, 5> all() {
+        return {&spectral_solves, &profile_solves, &lobe_fits, &stack_solves, &texels_rasterized};
+    }
 };
 
 inline Counters counters;

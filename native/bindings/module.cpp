@@ -6,12 +6,14 @@
 namespace nb = nanobind;
 
 void bind_optics(nb::module_& m);
+void bind_solve(nb::module_& m);
 void bind_texture(nb::module_& m);
 
 NB_MODULE(_core, m) {
     m.doc() = "Sanguine's native core. Units stand in the names: mm, per_mm, nm; fractions are 0 to 1.";
     m.attr("__version__") = SANGUINE_VERSION;
     bind_optics(m);
+    bind_solve(m);
     bind_texture(m);
     m.def(
         "counters",

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,8 +41,12 @@ struct Solution {
     std::vector<double> T_per_mm2;  ///< the same at the bottom; empty for a half-space
     /// Expected relative error of Rd, Tt and (in the L1 norm) the profiles, whichever is largest.
     double error_estimate = 0;
+    double elapsed_ms = 0;
+    std::string because;  ///< of `auto`: why this solver
     std::vector<std::string> warnings;
 };
+
+inline constexpr std::size_t max_radii = 100000;
 
 /// A solver cannot answer this problem, or knows that its answer would be wrong.
 struct SolverError : std::runtime_error {
@@ -67,7 +72,7 @@ public:
 /// Every rung of the ladder, cheapest first; `auto` is last.
 std::span<const Solver* const> solvers();
 
-/// Throws std::invalid_argument naming the nearest id.
+/// Throws std::invalid_argument naming those that there are.
 const Solver& find_solver(std::string_view id);
 
 /// Checks the problem, solves it, and checks that the answer is one: finite, not negative, no energy from nothing.

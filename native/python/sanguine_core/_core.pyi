@@ -84,6 +84,28 @@ def burley_lobes(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None
     reflectance; rgb (N, 3), the reflectance. Cycles' radius is 4 pi d.
     """
 
+class SolverError(Exception):
+    pass
+
+def solvers() -> list:
+    """
+    The solvers of solve(), cheapest first, as dicts of id and summary; 'auto' chooses among them.
+    """
+
+def solve(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order='C', device='cpu', writable=False)], incidence: str = 'normal', radii_mm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, solver: str = 'auto', tolerance: float = 0.01, max_seconds: float = 60.0, max_photons: int = 1073741824, seed: int = 1, threads: int = 0, progress: Callable | None = None) -> dict:
+    """
+    What becomes of light that falls from air on a stack of layers; shares of the incident light.
+
+    layers: (L, 5) from the surface down, mu_a and mu_s [1/mm], Henyey-Greenstein g, index n, thickness [mm],
+    infinite in the last layer for a half-space. incidence: 'normal' (pencil beam) or 'diffuse' (Lambertian
+    light on one point). radii_mm: (R,) ascending, where the profiles are wanted; without them totals alone.
+    Returns a dict: Rd (left the top after scattering), R_unscattered (back from a deeper face without), Tt (all
+    that left the bottom), specular (first surface), R_per_mm2 and T_per_mm2 (scattered light, (R,) or None),
+    error_estimate (relative; of profiles in the L1 norm), solver, because, warnings, elapsed_ms.
+    Raises ValueError for what cannot be, SolverError where the solver has no answer. progress(done, total) is
+    called on this thread a few times a second; False raises Cancelled.
+    """
+
 class ImageError(OSError):
     pass
 

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <string>
 
-#include "sanguine/adding_doubling.hpp"
 #include "sanguine/fresnel.hpp"
 #include "sanguine/hankel.hpp"
 
@@ -14,11 +13,6 @@ namespace {
 
 /// A free path of a thousand kilometres and more is no scattering, and its square no number to count with.
 constexpr double clear_below_per_mm = 1e-9;
-
-/// Streams of the adding-doubling that the totals are held against, and its own relative error with so many: 0.16 %
-/// over 38 stacks, skin and slabs (measured against Monte Carlo).
-constexpr int check_streams = 16;
-constexpr double check_error = 0.002;
 
 template <class... Values>
 std::string text(const char* format, Values... values) {
@@ -79,31 +73,6 @@ double cut_negative(std::span<const double> radii, std::span<const HankelResult>
         profile.push_back(scale * std::fmax(value, 0.0));
     }
     return all > 0 ? negative / all : 0;
-}
-
-/// Sets `error_estimate`, and warns of differences above `tolerance`.
-void hold_against_adding_doubling(const Problem& problem, double tolerance, Solution& solution) {
-    Totals exact;
-    try {
-        exact = adding_doubling(problem.layers, problem.incidence, check_streams);
-    } catch (const SolverError& error) {
-        solution.error_estimate = 1;
-        solution.warnings.push_back(text("the error could not be measured: %s", error.what()));
-        return;
-    }
-    const auto compare = [&](const char* name, double value, double right) {
-        // Where there is no light but that of the method (right = 0), it is all error.
-        // Next to a vanishing number a ratio need not be finite.
-        const double off = right > 0 ? std::fmin(value / right - 1, 1e6) : value > 0 ? 1 : 0;
-        if (std::fabs(off) > tolerance + check_error)
-            solution.warnings.push_back(text("%s is %.3g %% %s that of adding-doubling, %.4g", name,
-                                             100 * std::fabs(off), off > 0 ? "above" : "below", right));
-        solution.error_estimate = std::fmax(solution.error_estimate, std::fabs(off));
-    };
-    compare("Rd", solution.Rd, exact.Rd);
-    if (problem.layers.back().thickness != half_space)
-        compare("Tt", solution.Tt, exact.Tt);
-    solution.error_estimate += check_error;
 }
 
 }  // namespace
@@ -200,21 +169,20 @@ std::string Multipole::unsuited(const Problem& problem) const {
     return {};
 }
 
-Solution Multipole::solve(const Problem& problem, const Effort& effort) const {
+Solution Multipole::solve(const Problem& problem, const Effort&) const {
     const MultipoleStack stack(problem.layers);
     const bool finite = problem.layers.back().thickness != half_space;
     Solution solution;
     solution.solver = id();
     solution.specular = first_surface(problem);
+    solution.error_estimate = unmeasured_error;
     const double entering = 1 - solution.specular;
 
     // What each layer does by itself says where the method has left its ground.
-    bool off_ground = false;
     for (std::size_t i = 0; i < stack.layers().size(); ++i) {
         const MultipoleLayer& layer = stack.layers()[i];
         const double paths = layer.thickness / layer.source_depth;
         const MultipoleResponse alone = layer(0);
-        off_ground = off_ground || paths < 1 || layer.reduced_albedo < 0.5;
         if (paths < 1)
             solution.warnings.push_back(
                 text("layer %zu is %.3g mean free paths thick: its source lies below its bottom, and by itself it would "
@@ -243,7 +211,6 @@ Solution Multipole::solve(const Problem& problem, const Effort& effort) const {
         fail(text("more light out than in: %.6g of it reflected, %.6g transmitted", total.R, total.T));
     solution.Rd = entering * total.R;
     solution.Tt = finite ? entering * total.T : 0;
-    hold_against_adding_doubling(problem, effort.tolerance, solution);
 
     if (!problem.radii_mm.empty()) {
         const auto results = inverse_hankel(
@@ -262,7 +229,6 @@ Solution Multipole::solve(const Problem& problem, const Effort& effort) const {
         keep(0, "R", solution.R_per_mm2);
         if (finite)
             keep(1, "T", solution.T_per_mm2);
-        solution.error_estimate += off_ground ? profile_error_off_ground : profile_error;
         const double l = stack.layers().front().source_depth;
         if (problem.radii_mm.front() < l)
             solution.warnings.push_back(text("R(r) inside of r = %.3g mm, one mean free path, is not diffusion", l));

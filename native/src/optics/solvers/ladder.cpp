@@ -1,0 +1,149 @@
+// The rungs in one list, the choice between them, and the check that every answer passes.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <sstream>
+
+#include "sanguine/adding_doubling.hpp"
+#include "sanguine/monte_carlo.hpp"
+#include "sanguine/multipole.hpp"
+#include "sanguine/solver.hpp"
+
+namespace sanguine {
+namespace {
+
+std::string percent(double share) {
+    std::ostringstream out;
+    out.precision(2);
+    out << 100 * share << " %";
+    return out.str();
+}
+
+/// Takes the cheapest rung whose known error is within the tolerance. By rising cost: adding-doubling
+/// (milliseconds; totals alone), Monte Carlo (seconds). The multipole is on no tolerance's list: its
+/// profile is 13 to 200 % wrong on all but half-spaces of high albedo, and it cannot tell beforehand by how much.
+class Auto final : public Solver {
+public:
+    std::string_view id() const override { return "auto"; }
+    std::string_view summary() const override {
+        return "the cheapest of the others whose known error is within the tolerance";
+    }
+    std::string unsuited(const Problem&) const override { return {}; }
+
+    Solution solve(const Problem& problem, const Effort& effort) const override {
+        std::string because;
+        // Plane-parallel totals are cheap and next to exact for any stack; they also scale the profile.
+        const Problem totals_alone{problem.layers, problem.incidence, {}};
+        Solution totals;
+        bool have_totals = false;
+        try {
+            totals = adding_doubling_solver().solve(totals_alone, effort);
+            have_totals = totals.error_estimate <= effort.tolerance;
+            because = "adding-doubling gives the totals to " + percent(totals.error_estimate);
+        } catch (const SolverError& error) {
+            because = std::string("no adding-doubling: ") + error.what();
+        }
+        if (have_totals && problem.radii_mm.empty()) {
+            totals.because = because;
+            return totals;
+        }
+
+        Solution s = monte_carlo_solver().solve(problem, effort);
+        if (have_totals) {
+            because += ", Monte Carlo the profile to " + percent(s.error_estimate);
+            scale(s.R_per_mm2, totals.Rd, s.Rd);
+            // The profile at the bottom is of scattered light; the unscattered share needs no photons to be known.
+            scale(s.T_per_mm2, totals.Tt, s.Tt);
+            s.solver = "adding-doubling+monte-carlo";
+            s.Rd = totals.Rd;
+            s.R_unscattered = totals.R_unscattered;
+            s.Tt = totals.Tt;
+            s.specular = totals.specular;
+            s.warnings.insert(s.warnings.end(), totals.warnings.begin(), totals.warnings.end());
+        } else {
+            because += "; Monte Carlo has it to " + percent(s.error_estimate);
+        }
+        s.because = because;
+        if (s.error_estimate > effort.tolerance && s.warnings.empty())
+            s.warnings.push_back("no solver reached the tolerance");
+        return s;
+    }
+
+private:
+    static void scale(std::vector<double>& profile, double exact, double estimated) {
+        if (estimated > 0)
+            for (double& value : profile)
+                value *= exact / estimated;
+    }
+};
+
+const Auto automatic;
+
+void check_problem(const Problem& problem, const Effort& effort) {
+    check_stack(problem.layers);
+    if (problem.radii_mm.size() > max_radii)
+        throw std::invalid_argument("radii_mm: more than " + std::to_string(max_radii));
+    double last = 0;
+    for (const double r : problem.radii_mm) {
+        if (!(r > last && std::isfinite(r)))
+            throw std::invalid_argument("radii_mm: " + std::to_string(r) + " is not above 0, finite and above the one before");
+        last = r;
+    }
+    if (!(effort.tolerance > 0 && effort.tolerance <= 1))
+        throw std::invalid_argument("tolerance: " + std::to_string(effort.tolerance) + " is not above 0 and at most 1");
+    if (!(effort.max_seconds > 0))
+        throw std::invalid_argument("max_seconds: " + std::to_string(effort.max_seconds) + " is not above 0");
+    if (effort.max_photons == 0)
+        throw std::invalid_argument("max_photons: 0 is not above 0");
+}
+
+/// What every answer has to be, whoever gave it. Energy may exceed 1 by rounding alone.
+void check_solution(const Solution& s) {
+    const auto share = [](double value) { return value >= 0 && value <= 1 + 1e-9; };
+    const auto density = [](double value) { return value >= 0 && std::isfinite(value); };
+    if (!share(s.Rd) || !share(s.R_unscattered) || !share(s.Tt) || !share(s.specular)
+        || !share(s.Rd + s.R_unscattered + s.Tt + s.specular)) {
+        std::ostringstream message;
+        message << s.solver << ": no physical answer: Rd " << s.Rd << ", R_unscattered " << s.R_unscattered << ", Tt "
+                << s.Tt << ", specular " << s.specular;
+        throw SolverError(message.str());
+    }
+    if (!std::ranges::all_of(s.R_per_mm2, density) || !std::ranges::all_of(s.T_per_mm2, density))
+        throw SolverError(s.solver + ": no physical answer: a profile is negative or not finite");
+    if (!(s.error_estimate >= 0))
+        throw SolverError(s.solver + ": no physical answer: its error is unknown");
+}
+
+}  // namespace
+
+std::span<const Solver* const> solvers() {
+    static const std::array<const Solver*, 4> all = {&multipole_solver(), &adding_doubling_solver(),
+                                                     &monte_carlo_solver(), &automatic};
+    return all;
+}
+
+const Solver& find_solver(std::string_view id) {
+    std::string known;
+    for (const Solver* solver : solvers()) {
+        if (solver->id() == id)
+            return *solver;
+        known += (known.empty() ? "" : ", ") + std::string(solver->id());
+    }
+    throw std::invalid_argument("solver: no '" + std::string(id) + "', known: " + known);
+}
+
+Solution solve(const Problem& problem, const Solver& solver, const Effort& effort) {
+    check_problem(problem, effort);
+    if (const std::string reason = solver.unsuited(problem); !reason.empty())
+        throw SolverError(std::string(solver.id()) + ": " + reason);
+    const auto start = std::chrono::steady_clock::now();
+    Solution s = solver.solve(problem, effort);
+    s.elapsed_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    if (s.solver.empty())
+        s.solver = solver.id();
+    check_solution(s);
+    return s;
+}
+
+}  // namespace sanguine
