@@ -101,8 +101,8 @@ TEST(AddingDoubling, OneScatteringIsExactInThinLayers) {
     }
     // The same between two faces: doubling the little that scatters doubles the answer, trapped light included.
     const auto rd = [](double mu_s) {
-        return adding_doubling(Stack{{0, 0, 0, 1.7, 1}, {1, mu_s, 0.8, 1.4, 0.1}, {0, 0, 0, 2, 1}}, Incidence::normal, 8)
-            .Rd;
+        const Stack stack{{0, 0, 0, 1.7, 1}, {1, mu_s, 0.8, 1.4, 0.1}, {0, 0, 0, 2, 1}};
+        return adding_doubling(stack, Incidence::normal, 8).Rd;
     };
     EXPECT_NEAR(rd(2e-12) / rd(1e-12), 2, 1e-9);
     EXPECT_NEAR(rd(2e-40) / rd(1e-40), 2, 1e-12);
@@ -208,9 +208,10 @@ TEST(AddingDoubling, ExtremesGiveLight) {
     for (int trial = 0; trial < 1500; ++trial) {
         Stack stack(1 + trial % 8);
         for (Layer& layer : stack)
-            layer = {pick({0, 5e-324, 1e-300, 1e-12, 1e-3, 1, 1e3, 1e6}), pick({0, 5e-324, 1e-300, 1e-12, 1e-3, 1, 1e3, 1e6}),
-                     pick({-0.99, -0.5, 0, 1e-9, 0.8, 0.999}), pick({1, 1 + 1e-12, 1.0001, 1.33, 1.4, 1.5, 3, 4}),
-                     pick({1e-6, 1e-3, 1, 1e3})};
+            layer = {pick({0, 5e-324, 1e-300, 1e-12, 1e-3, 1, 1e3, 1e6}),
+                     pick({0, 5e-324, 1e-300, 1e-12, 1e-3, 1, 1e3, 1e6}),
+                     pick({-0.99, -0.5, 0, 1e-9, 0.8, 0.95, 0.999}),
+                     pick({1, 1 + 1e-12, 1 + 1e-7, 1.0001, 1.33, 1.4, 1.5, 3, 4}), pick({1e-6, 1e-3, 1, 1e3})};
         if (trial % 3 == 0)
             stack.back().thickness = half_space;
         const Incidence incidence = trial % 2 ? Incidence::normal : Incidence::diffuse;

@@ -122,7 +122,8 @@ Streams::Streams(std::span<const Layer> stack, int count) {
             const double n = media[k].n;
             for (Index i = 0; i < points[k].size(); ++i, ++at) {
                 const double mu = points[k][i];
-                medium.cosine[at] = k == m ? mu : std::sqrt((medium.n - n) * (medium.n + n) + n * n * mu * mu) / medium.n;
+                medium.cosine[at] =
+                    k == m ? mu : std::sqrt((medium.n - n) * (medium.n + n) + n * n * mu * mu) / medium.n;
                 if (k == m)
                     root_weight[at] = n * std::sqrt(2 * mu * weights[k][i]);
             }
@@ -148,20 +149,27 @@ struct Below {
     VectorXd through_scattered;
 };
 
-/// Gram-Schmidt, twice, of columns weighted by `weight`. The even Legendre polynomials are orthogonal on 0..1, and so
-/// are the odd ones; made so on the streams too (they are not Gauss points of one interval), the moments of the phase
-/// function, norm and g before all, hold exactly for any number of streams.
-void orthonormalise(MatrixXd& columns, const ArrayXd& weight) {
+/// Gram-Schmidt, twice, of columns weighted by `weight`; returns how many the rows can tell apart. The even Legendre
+/// polynomials are orthogonal on 0..1, and so are the odd ones; made so on the streams too (they are not Gauss points
+/// of one interval), the moments of the phase function, norm and g before all, hold for any number of streams.
+Index orthonormalise(MatrixXd& columns, const ArrayXd& weight) {
+    // Of a column that is nearly a sum of the earlier ones (streams crowd between two like indices) only noise is left.
+    constexpr double told_apart = 0.01;
     for (Index k = 0; k < columns.cols(); ++k) {
         auto column = columns.col(k);
         column.array() *= weight;
+        const double whole = column.norm();
         for (int pass = 0; pass < 2 && k > 0; ++pass) {
             const auto before = columns.leftCols(k);
             const VectorXd along = before.transpose() * column;
             column.noalias() -= before * along;
         }
-        column.normalize();
+        const double left = column.norm();
+        if (!(left > told_apart * whole))
+            return k;
+        column /= left;
     }
+    return columns.cols();
 }
 
 class Solve {
@@ -244,27 +252,29 @@ void Solve::generator(double absorption, double scattering, double g, const Medi
 
     // Wiscombe 1977: what lies beyond the moments that the streams can carry is a peak, forward for g > 0, backward
     // (odd moments negative) for g < 0.
-    const Index moments = n + n / 2;
-    const double peak = std::pow(std::fabs(g), static_cast<double>(moments));
+    Index moments = n + n / 2;
     VectorXd p0 = VectorXd::Ones(n), p1 = medium.cosine, p2;
     MatrixXd& even = c_;
     MatrixXd& odd = d_;
     even.resize(n, (moments + 1) / 2);
     odd.resize(n, moments / 2);
-    VectorXd even_weight(even.cols()), odd_weight(odd.cols());
-    double power = 1;
     for (Index l = 0; l < moments; ++l) {
-        const double sign = g < 0 && l % 2 == 1 ? -1 : 1;
         (l % 2 == 0 ? even : odd).col(l / 2) = p0;
-        (l % 2 == 0 ? even_weight : odd_weight)[l / 2] = 0.5 * scattering * (power - sign * peak);
-        power *= g;
         p2 = ((2.0 * l + 3) * medium.cosine.array() * p1.array() - (l + 1.0) * p0.array()) / (l + 2.0);
         p0.swap(p1);
         p1.swap(p2);
     }
     const ArrayXd root_mu = mu.sqrt();
-    orthonormalise(even, s_.array() / root_mu);
-    orthonormalise(odd, s_.array() / root_mu);
+    const ArrayXd root_weight = s_.array() / root_mu;
+    moments = std::min(2 * orthonormalise(even, root_weight), 2 * orthonormalise(odd, root_weight) + 1);
+    const double peak = std::pow(std::fabs(g), static_cast<double>(moments));
+    VectorXd even_weight = VectorXd::Zero(even.cols()), odd_weight = VectorXd::Zero(odd.cols());
+    double power = 1;
+    for (Index l = 0; l < std::min(moments, even.cols() + odd.cols()); ++l) {
+        const double sign = g < 0 && l % 2 == 1 ? -1 : 1;
+        (l % 2 == 0 ? even_weight : odd_weight)[l / 2] = 0.5 * scattering * (power - sign * peak);
+        power *= g;
+    }
     even = (1 / root_mu).matrix().asDiagonal() * even;
     odd = (1 / root_mu).matrix().asDiagonal() * odd;
     a_.noalias() = even * even_weight.asDiagonal() * even.transpose();
