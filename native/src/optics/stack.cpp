@@ -1,16 +1,15 @@
 #include "sanguine/stack.hpp"
 
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
+
+#include "message.hpp"
 
 namespace sanguine {
 namespace {
 
 [[noreturn]] void refuse(std::size_t layer, const char* key, double value, const char* allowed) {
-    std::ostringstream message;
-    message << "layers." << layer << "." << key << ": " << value << " is not " << allowed;
-    throw std::invalid_argument(message.str());
+    throw std::invalid_argument(message("layers.", layer, ".", key, ": ", value, " is not ", allowed));
 }
 
 }  // namespace

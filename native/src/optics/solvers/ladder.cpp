@@ -3,8 +3,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <sstream>
 
+#include "message.hpp"
 #include "sanguine/adding_doubling.hpp"
 #include "sanguine/monte_carlo.hpp"
 #include "sanguine/multipole.hpp"
@@ -14,10 +14,7 @@ namespace sanguine {
 namespace {
 
 std::string percent(double share) {
-    std::ostringstream out;
-    out.precision(2);
-    out << 100 * share << " %";
-    return out.str();
+    return message(100 * share, " %");
 }
 
 /// Takes the cheapest rung whose known error is within the tolerance. By rising cost: adding-doubling
@@ -104,10 +101,8 @@ void check_solution(const Solution& s) {
     const auto density = [](double value) { return value >= 0 && std::isfinite(value); };
     if (!share(s.Rd) || !share(s.R_unscattered) || !share(s.Tt) || !share(s.specular)
         || !share(s.Rd + s.R_unscattered + s.Tt + s.specular)) {
-        std::ostringstream message;
-        message << s.solver << ": no physical answer: Rd " << s.Rd << ", R_unscattered " << s.R_unscattered << ", Tt "
-                << s.Tt << ", specular " << s.specular;
-        throw SolverError(message.str());
+        throw SolverError(message(s.solver, ": no physical answer: Rd ", s.Rd, ", R_unscattered ", s.R_unscattered, ", Tt ",
+                                  s.Tt, ", specular ", s.specular));
     }
     if (!std::ranges::all_of(s.R_per_mm2, density) || !std::ranges::all_of(s.T_per_mm2, density))
         throw SolverError(s.solver + ": no physical answer: a profile is negative or not finite");

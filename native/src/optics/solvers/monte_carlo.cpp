@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <stdexcept>
 
+#include "message.hpp"
 #include "sanguine/photon_tracer.hpp"
 
 namespace sanguine {
@@ -283,12 +283,7 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
     const double cut = t.cut.mean / std::fmax(t.Rd.mean, small_share);
     s.error_estimate = std::fmax(totals_error + (all_returns ? 0 : cut), profile_error / 2 + (radii.empty() ? 0 : cut));
 
-    const auto warn = [&](auto&&... parts) {
-        std::ostringstream text;
-        text.precision(3);
-        (text << ... << parts);
-        s.warnings.push_back(text.str());
-    };
+    const auto warn = [&](const auto&... parts) { s.warnings.push_back(message(parts...)); };
     if (std::fmax(totals_error, profile_error / 2) > effort.tolerance)
         warn("tolerance ", effort.tolerance, " not reached: ", in_time ? "max_photons" : "max_seconds", " ended the run at ",
              t.photons, " photons; three standard errors of the totals are ", totals_error, ", the profile's noise is ",

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
+#include "message.hpp"
 #include "sanguine/fresnel.hpp"
 #include "sanguine/hankel.hpp"
 
@@ -13,13 +13,6 @@ namespace {
 
 /// A free path of a thousand kilometres and more is no scattering, and its square no number to count with.
 constexpr double clear_below_per_mm = 1e-9;
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-    std::string out(static_cast<std::size_t>(std::snprintf(nullptr, 0, format, values...)), '\0');
-    std::snprintf(out.data(), out.size() + 1, format, values...);
-    return out;
-}
 
 double reduced_scattering(const Layer& layer) { return layer.mu_s * (1 - layer.g); }
 
@@ -160,11 +153,11 @@ std::string Multipole::unsuited(const Problem& problem) const {
     for (std::size_t i = 0; i < problem.layers.size(); ++i) {
         const Layer& layer = problem.layers[i];
         if (reduced_scattering(layer) < clear_below_per_mm)
-            return text("layer %zu does not scatter, so nothing diffuses in it", i);
+            return message("layer ", i, " does not scatter, so nothing diffuses in it");
         for (const int step : {-1, 1})
             if (!(internal_reflectance(layer.n / index_of_neighbour(problem.layers, i, step)) < 1))
-                return text("layer %zu: the method's fit of the internal reflection ends before a ratio of indices of %g",
-                            i, layer.n / index_of_neighbour(problem.layers, i, step));
+                return message("layer ", i, ": the method's fit of the internal reflection ends before a ratio of indices of ",
+                               layer.n / index_of_neighbour(problem.layers, i, step));
     }
     return {};
 }
@@ -185,13 +178,12 @@ Solution Multipole::solve(const Problem& problem, const Effort&) const {
         const MultipoleResponse alone = layer(0);
         if (paths < 1)
             solution.warnings.push_back(
-                text("layer %zu is %.3g mean free paths thick: its source lies below its bottom, and by itself it would "
-                     "reflect %.3g and transmit %.3g of the light",
-                     i, paths, alone.R, alone.T));
+                message("layer ", i, " is ", paths, " mean free paths thick: its source lies below its bottom, and by itself "
+                        "it would reflect ", alone.R, " and transmit ", alone.T, " of the light"));
         if (layer.reduced_albedo < 0.5)
             solution.warnings.push_back(
-                text("layer %zu has a reduced albedo of %.3g: it absorbs more than it scatters, which is not diffusion", i,
-                     layer.reduced_albedo));
+                message("layer ", i, " has a reduced albedo of ", layer.reduced_albedo,
+                        ": it absorbs more than it scatters, which is not diffusion"));
     }
     if (problem.incidence == Incidence::diffuse)
         solution.warnings.push_back("diffuse light enters with its own Fresnel loss and is then treated as normal light");
@@ -206,9 +198,9 @@ Solution Multipole::solve(const Problem& problem, const Effort&) const {
     if (!std::isfinite(total.R) || !std::isfinite(total.T))
         fail("the sum over the layers is not finite");
     if (total.R < 0 || total.T < 0)
-        fail(text("negative light: %.3g of it reflected, %.3g transmitted", total.R, total.T));
+        fail(message("negative light: ", total.R, " of it reflected, ", total.T, " transmitted"));
     if (total.R + total.T > 1 + 1e-9)
-        fail(text("more light out than in: %.6g of it reflected, %.6g transmitted", total.R, total.T));
+        fail(message("more light out than in, by ", total.R + total.T - 1));
     solution.Rd = entering * total.R;
     solution.Tt = finite ? entering * total.T : 0;
 
@@ -222,16 +214,16 @@ Solution Multipole::solve(const Problem& problem, const Effort&) const {
         const auto keep = [&](int which, const char* name, std::vector<double>& profile) {
             const double negative = cut_negative(problem.radii_mm, results, which, entering, profile);
             if (negative > max_negative_share)
-                fail(text("negative light: %.3g of %s(r) over the radii asked for", negative, name));
+                fail(message("negative light: ", negative, " of ", name, "(r) over the radii asked for"));
             if (negative > 0)
-                solution.warnings.push_back(text("%.2g of %s(r) was negative and is cut off", negative, name));
+                solution.warnings.push_back(message(negative, " of ", name, "(r) was negative and is cut off"));
         };
         keep(0, "R", solution.R_per_mm2);
         if (finite)
             keep(1, "T", solution.T_per_mm2);
         const double l = stack.layers().front().source_depth;
         if (problem.radii_mm.front() < l)
-            solution.warnings.push_back(text("R(r) inside of r = %.3g mm, one mean free path, is not diffusion", l));
+            solution.warnings.push_back(message("R(r) inside of r = ", l, " mm, one mean free path, is not diffusion"));
     }
     return solution;
 }
