@@ -71,9 +71,10 @@ TEST(Skin, DarkerWithMelaninAndHemoglobin) {
                 skins[i].*field = 0.01 * static_cast<double>(i);
             }
             const std::vector<double> r = reflectance(skins, nm, 0, {});
+            // Under half a millimetre of pigment blood changes less than a float's last digits, which are free to move.
             for (std::size_t i = 0; i + 1 < skins.size(); ++i)
                 for (std::size_t w = 0; w < nm.size(); ++w)
-                    ASSERT_GT(r[i * nm.size() + w], r[(i + 1) * nm.size() + w])
+                    ASSERT_GT(r[i * nm.size() + w] * (1 + 1e-6), r[(i + 1) * nm.size() + w])
                         << i << ' ' << nm[w] << ' ' << thickness;
         }
 }
@@ -161,6 +162,42 @@ TEST(Burley, ChannelWithoutEnergyIsReported) {
     for (const double weight : fit.weight)
         EXPECT_EQ(weight, 0);
     EXPECT_EQ(fit.clamped, 1);
+}
+
+TEST(Burley, TakesAnyProfile) {
+    // Flat, a single ring (the first, a middle one, the last), spikes of both signs, next to nothing, and all of it
+    // shadowed by light that is missing: non-negative weights that add up to the energy, finite widths and errors.
+    const std::size_t n = rgb_ring_edges_mm().size();
+    std::vector<std::vector<double>> profiles = {std::vector<double>(n, 0.01), std::vector<double>(n, 0.0),
+                                                 std::vector<double>(n, 1e-300), std::vector<double>(n, 1e-310)};
+    for (const std::size_t ring : {std::size_t{0}, n / 2, n - 1})
+        for (const double value : {0.4, 1e-12, 1e12, -0.4}) {
+            profiles.emplace_back(n, 0.0);
+            profiles.back()[ring] = value;
+        }
+    for (const double total : {0.5, 1e-3, 1e-9, 1e-16}) {
+        profiles.emplace_back(n, 0.0);
+        for (std::size_t i = 0; i < n; ++i)
+            profiles.back()[i] = i % 2 == 0 ? 1 : -1;
+        profiles.back()[3] += total - 1;
+    }
+    for (const std::vector<double>& energy : profiles)
+        for (int count = 1; count <= max_lobes; ++count) {
+            double total = 0;
+            for (const double e : energy)
+                total += e;
+            const BurleyFit fit = fit_burley(energy, rgb_ring_edges_mm(), count);
+            double sum = 0;
+            for (int k = 0; k < max_lobes; ++k) {
+                ASSERT_TRUE(fit.weight[k] >= 0 && std::isfinite(fit.weight[k])) << energy[0] << ' ' << count;
+                sum += fit.weight[k];
+                if (k < count) {
+                    ASSERT_TRUE(std::isfinite(fit.d_mm[k]) && fit.d_mm[k] > 0);
+                }
+            }
+            ASSERT_NEAR(sum, std::max(0.0, total), 1e-12 * std::fabs(total)) << energy[0] << ' ' << count;
+            ASSERT_TRUE(std::isfinite(fit.fit_error) && std::isfinite(fit.clamped) && fit.clamped >= 0);
+        }
 }
 
 TEST(Burley, NearTheFloorOfItsForm) {

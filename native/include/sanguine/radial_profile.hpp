@@ -19,6 +19,10 @@ public:
     /// Share of the incident light that leaves within `radius_mm` of its entry.
     double energy_within(double radius_mm) const;
 
+    /// The same for a ladder of radii first_mm * radius_ratio^k: all of them lie at one fraction between two edges of
+    /// rings, which is what makes this cheap.
+    void energy_within_ladder(double first_mm, std::span<double> out) const;
+
     /// R(r) [1/mm^2], per unit of light that falls on one point; `radius_mm` > 0.
     double density(double radius_mm) const;
 

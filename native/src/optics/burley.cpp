@@ -7,8 +7,12 @@
 
 #include <Eigen/Dense>
 
+#include "vector_math.hpp"
+
 namespace sanguine {
 namespace {
+
+using vector_math::exp_minus;
 
 /// ln(d / characteristic radius) where the widths start and are held, widest lobe first. Found by trial over 600 skins:
 /// other ladders that reach from the epidermis to the dermis do as well to a few tenths of a percent.
@@ -26,49 +30,95 @@ constexpr double moment_weight = 0.3;
 constexpr double lobe_mean_radius = 2.431;
 
 constexpr int iterations = 12;
-constexpr double difference = 1e-3;  // of ln d, for derivatives
-constexpr double max_step = 0.5;     // of ln d
-constexpr double converged = 1e-3;   // of ln d: a step below this is the last
+constexpr double max_step = 0.5;   // of ln d
+constexpr double converged = 1e-3; // of ln d: a step below this is the last
+
+/// Below this share of the light that a channel gains, what it keeps after its losses is rounding.
+constexpr double least_share = 1e-6;
 
 using Vector = std::array<double, max_lobes>;
-/// Small systems without a heap: at most one row per lobe and one for the energy.
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_lobes + 1, max_lobes + 1>;
-using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_lobes + 1, 1>;
+
+/// One value per ring and one for the mean radius, padded with zeros to whole blocks.
+class Residuals {
+public:
+    static constexpr std::size_t block = 8;
+    explicit Residuals(std::size_t count = 0) : values_((count + block - 1) / block * block) {}
+
+    double* data() { return values_.data(); }
+    const double* data() const { return values_.data(); }
+    std::size_t padded() const { return values_.size(); }
+    double& operator[](std::size_t i) { return values_[i]; }
+    double operator[](std::size_t i) const { return values_[i]; }
+
+private:
+    std::vector<double> values_;
+};
+
+typedef double Block __attribute__((vector_size(64), aligned(8), may_alias));
+static_assert(sizeof(Block) == Residuals::block * sizeof(double));
+
+SANGUINE_VECTOR_CLONES
+double dot(const double* a, const double* b, std::size_t count) {
+    Block sum{};
+    for (std::size_t i = 0; i < count; i += Residuals::block)
+        sum += *reinterpret_cast<const Block*>(a + i) * *reinterpret_cast<const Block*>(b + i);
+    return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+}
+
+double dot(const Residuals& a, const Residuals& b) {
+    return dot(a.data(), b.data(), a.padded());
+}
+
+/// Energy of a lobe within each edge, and its derivative by ln d.
+SANGUINE_VECTOR_CLONES
+void lobe_energy(const double* edges, std::size_t count, double per_d, double* within, double* slope) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const double y = edges[i] * per_d, narrow = exp_minus(y), cube = narrow * narrow * narrow;
+        within[i] = 1 - 0.25 * cube - 0.75 * narrow;
+        slope[i] = -0.75 * y * (cube + narrow);
+    }
+}
+
+/// Energy between neighbouring edges, in place.
+void difference(double* within, std::size_t count) {
+    for (std::size_t i = count; i-- > 1;)
+        within[i] -= within[i - 1];
+}
 
 /// The fit of one channel. Energies are in shares of their total, so weights add up to 1.
 class Fitter {
 public:
     /// `mean_radius`: of the profile, where it is to be kept; 0 where not.
-    Fitter(std::vector<double> share, std::span<const double> edges, double mean_radius, int count)
-        : share_(std::move(share)), edges_(edges), mean_radius_(mean_radius), count_(count) {
-        share_.push_back(mean_radius_ > 0 ? moment_weight : 0);  // the last residual is that of the mean radius
-        for (auto& lobe : lobes_)
-            lobe.resize(share_.size());
-        for (auto& derivative : derivatives_)
-            derivative.resize(share_.size());
-        residual_.resize(share_.size());
+    Fitter(std::span<const double> energy, double total, std::span<const double> edges, double mean_radius, int count)
+        : share_(edges.size() + 1), edges_(edges), mean_radius_(mean_radius), count_(count), residual_(share_) {
+        for (std::size_t i = 0; i < edges_.size(); ++i)
+            share_[i] = energy[i] / total;
+        // The last residual is that of the mean radius.
+        share_[edges_.size()] = mean_radius_ > 0 ? moment_weight : 0;
+        for (int k = 0; k < count_; ++k)
+            lobes_[k] = slopes_[k] = derivatives_[k] = Residuals(edges_.size() + 1);
     }
 
     /// Best widths from `log_d`, which is also where they are held.
     Vector fit(Vector log_d) {
         const Vector held = log_d;
-        for (int k = 0; k < count_; ++k)
-            set_lobe(k, log_d[k]);
-        double cost = evaluate(residual_) + penalty(log_d, held);
+        set_lobes(log_d);
+        double cost = evaluate() + penalty(log_d, held);
         double damping = 1e-3;
-        std::vector<double> trial_residual(share_.size());
         for (int i = 0; i < iterations; ++i) {
-            differentiate(log_d);
-            Matrix normal(count_, count_);
-            Column downhill(count_);
+            differentiate();
+            Eigen::Matrix<double, max_lobes, max_lobes> normal = decltype(normal)::Identity();
+            Eigen::Matrix<double, max_lobes, 1> downhill = decltype(downhill)::Zero();
+            double trace = 0;
             for (int k = 0; k < count_; ++k) {
-                for (int l = 0; l < count_; ++l)
-                    normal(k, l) = dot(derivatives_[k], derivatives_[l]);
+                for (int l = 0; l <= k; ++l)
+                    normal(k, l) = normal(l, k) = dot(derivatives_[k], derivatives_[l]);
+                normal(k, k) += stiffness;
+                trace += normal(k, k);
                 downhill[k] = -dot(derivatives_[k], residual_) - stiffness * (log_d[k] - held[k]);
             }
-            normal.diagonal().array() += stiffness;
-            normal.diagonal().array() += damping * normal.trace();
-            const Column step = normal.ldlt().solve(downhill);
+            normal.diagonal().array() += damping * trace;
+            const Eigen::Matrix<double, max_lobes, 1> step = normal.ldlt().solve(downhill);
             if (!step.allFinite())
                 break;
 
@@ -77,27 +127,29 @@ public:
             for (int k = 0; k < count_; ++k) {
                 largest = std::fmax(largest, std::fabs(step[k]));
                 trial[k] += std::clamp(step[k], -max_step, max_step);
-                set_lobe(k, trial[k]);
             }
-            const double trial_cost = evaluate(trial_residual) + penalty(trial, held);
+            const Best before = best_;
+            set_lobes(trial);
+            const double trial_cost = evaluate() + penalty(trial, held);
             if (trial_cost < cost) {
                 log_d = trial;
                 cost = trial_cost;
-                residual_.swap(trial_residual);
                 damping *= 0.3;
+                if (largest < converged)
+                    break;
             } else {
-                for (int k = 0; k < count_; ++k)
-                    set_lobe(k, log_d[k]);
+                set_lobes(log_d);
+                best_ = before;
+                set_residual();
                 damping *= 5;
+                if (largest < converged)
+                    break;
             }
-            if (largest < converged)
-                break;
         }
-        evaluate(residual_);  // leaves the weights of the widths that are returned
         return log_d;
     }
 
-    const Vector& weights() const { return weights_; }
+    const Vector& weights() const { return best_.weight; }
 
     double l1_error() const {
         double sum = 0;
@@ -107,12 +159,15 @@ public:
     }
 
 private:
-    static double dot(const std::vector<double>& a, const std::vector<double>& b) {
-        double sum = 0;
-        for (std::size_t i = 0; i < a.size(); ++i)
-            sum += a[i] * b[i];
-        return sum;
-    }
+    /// Optimality conditions of the weights in a set of lobes that may be above 0, and of their sum: one row per lobe
+    /// (identity outside of the set) and the last for the sum.
+    using Conditions = Eigen::Matrix<double, max_lobes + 1, max_lobes + 1>;
+    using Column = Eigen::Matrix<double, max_lobes + 1, 1>;
+
+    struct Best {
+        Vector weight{};
+        int set = 0;
+    };
 
     double penalty(const Vector& log_d, const Vector& held) const {
         double sum = 0;
@@ -121,83 +176,117 @@ private:
         return stiffness * sum;
     }
 
-    /// Energy of lobe `k` in each ring, and its products with everything else.
-    void set_lobe(int k, double log_d) {
-        const double d = std::exp(log_d);
-        double inside = 0;
-        for (std::size_t i = 0; i < edges_.size(); ++i) {
-            const double within = burley_energy_within(edges_[i], d);
-            lobes_[k][i] = within - inside;
-            inside = within;
+    /// Energies of the lobes in each ring, their derivatives by ln d, and their products.
+    void set_lobes(const Vector& log_d) {
+        const std::size_t n = edges_.size();
+        for (int k = 0; k < count_; ++k) {
+            const double d = std::exp(log_d[k]);
+            lobe_energy(edges_.data(), n, 1 / (3 * d), lobes_[k].data(), slopes_[k].data());
+            difference(lobes_[k].data(), n);
+            difference(slopes_[k].data(), n);
+            lobes_[k][n] = slopes_[k][n] = mean_radius_ > 0 ? moment_weight * lobe_mean_radius * d / mean_radius_ : 0;
         }
-        lobes_[k].back() = mean_radius_ > 0 ? moment_weight * lobe_mean_radius * d / mean_radius_ : 0;
-        for (int l = 0; l < count_; ++l)
-            gram_[k][l] = gram_[l][k] = dot(lobes_[k], lobes_[l]);
-        gram_[k][k] *= 1 + 1e-9;  // two equal lobes share their weight instead of dividing by zero
-        target_[k] = dot(lobes_[k], share_);
+        for (int k = 0; k < count_; ++k) {
+            for (int l = 0; l <= k; ++l)
+                gram_[k][l] = gram_[l][k] = dot(lobes_[k], lobes_[l]);
+            gram_[k][k] *= 1 + 1e-9;  // two equal lobes share their weight instead of dividing by zero
+            target_[k] = dot(lobes_[k], share_);
+        }
+    }
+
+    Conditions conditions(int set) const {
+        Conditions out = Conditions::Identity();
+        out(max_lobes, max_lobes) = 0;
+        for (int k = 0; k < count_; ++k) {
+            if (!(set >> k & 1))
+                continue;
+            for (int l = 0; l < count_; ++l)
+                if (set >> l & 1)
+                    out(k, l) = gram_[k][l];
+            out(k, max_lobes) = out(max_lobes, k) = 1;
+        }
+        return out;
     }
 
     /// Weights >= 0 that add up to 1 and are nearest to the profile: the best of the stationary points of all sets of
-    /// lobes that may be above 0, at most 15. Returns the squared error, with `residual` = lobes - profile.
-    double evaluate(std::vector<double>& residual) {
-        double best = INFINITY;
-        for (int set = 1; set < 1 << count_; ++set) {
-            int member[max_lobes], size = 0;
+    /// lobes that may be above 0, at most 15; that of all lobes together, where it is one, cannot be beaten. Returns
+    /// the squared error and leaves `residual_` = lobes - profile.
+    double evaluate() {
+        double least = INFINITY;
+        const int all = (1 << count_) - 1;
+        for (int set = all; set > 0; --set) {
+            Column right = Column::Zero();
             for (int k = 0; k < count_; ++k)
                 if (set >> k & 1)
-                    member[size++] = k;
-            Matrix kkt = Matrix::Zero(size + 1, size + 1);
-            Column right(size + 1);
-            for (int i = 0; i < size; ++i) {
-                for (int j = 0; j < size; ++j)
-                    kkt(i, j) = gram_[member[i]][member[j]];
-                kkt(i, size) = kkt(size, i) = 1;
-                right[i] = target_[member[i]];
-            }
-            right[size] = 1;
-            const Column w = kkt.partialPivLu().solve(right);
-            if (!w.allFinite() || w.head(size).minCoeff() < 0)
+                    right[k] = target_[k];
+            right[max_lobes] = 1;
+            const Column w = conditions(set).partialPivLu().solve(right);
+            if (!w.allFinite() || w.head<max_lobes>().minCoeff() < 0)
                 continue;
             double cost = 0;  // less the constant |profile|^2
-            for (int i = 0; i < size; ++i) {
-                for (int j = 0; j < size; ++j)
-                    cost += w[i] * w[j] * gram_[member[i]][member[j]];
-                cost -= 2 * w[i] * target_[member[i]];
+            for (int k = 0; k < count_; ++k) {
+                for (int l = 0; l < count_; ++l)
+                    cost += w[k] * w[l] * gram_[k][l];
+                cost -= 2 * w[k] * target_[k];
             }
-            if (cost < best) {
-                best = cost;
-                weights_ = {};
-                for (int i = 0; i < size; ++i)
-                    weights_[member[i]] = w[i];
+            if (cost < least) {
+                least = cost;
+                best_.set = set;
+                for (int k = 0; k < count_; ++k)
+                    best_.weight[k] = w[k];
             }
+            if (set == all)
+                break;
         }
-        for (std::size_t i = 0; i < share_.size(); ++i) {
-            residual[i] = -share_[i];
-            for (int k = 0; k < count_; ++k)
-                residual[i] += weights_[k] * lobes_[k][i];
-        }
-        return dot(residual, residual);
+        set_residual();
+        return dot(residual_, residual_);
     }
 
-    /// Derivatives of the residual by ln d with the weights following (variable projection, Golub and Pereyra 1973).
-    void differentiate(const Vector& log_d) {
+    void set_residual() {
+        for (std::size_t i = 0; i < share_.padded(); ++i)
+            residual_[i] = -share_[i];
+        for (int k = 0; k < count_; ++k)
+            add(residual_, best_.weight[k], lobes_[k]);
+    }
+
+    static void add(Residuals& to, double factor, const Residuals& what) {
+        double* out = to.data();
+        const double* in = what.data();
+        for (std::size_t i = 0; i < to.padded(); ++i)
+            out[i] += factor * in[i];
+    }
+
+    /// Derivatives of the residual by ln d with the weights following (variable projection, Golub and Pereyra 1973):
+    /// those of the weights solve the differentiated conditions of optimality.
+    void differentiate() {
+        const auto solver = conditions(best_.set).partialPivLu();
         for (int k = 0; k < count_; ++k) {
-            set_lobe(k, log_d[k] + difference);
-            evaluate(derivatives_[k]);
-            for (std::size_t i = 0; i < share_.size(); ++i)
-                derivatives_[k][i] = (derivatives_[k][i] - residual_[i]) / difference;
-            set_lobe(k, log_d[k]);
+            for (std::size_t i = 0; i < share_.padded(); ++i)
+                derivatives_[k][i] = 0;
+            if (!(best_.set >> k & 1))
+                continue;
+            Column right = Column::Zero();
+            for (int l = 0; l < count_; ++l)
+                if (best_.set >> l & 1)
+                    right[l] = -best_.weight[k] * dot(lobes_[l], slopes_[k]);
+            right[k] -= dot(slopes_[k], residual_);
+            const Column change = solver.solve(right);
+            add(derivatives_[k], best_.weight[k], slopes_[k]);
+            for (int l = 0; l < count_; ++l)
+                if (best_.set >> l & 1)
+                    add(derivatives_[k], change[l], lobes_[l]);
         }
     }
 
-    std::vector<double> share_;
+    Residuals share_;
     std::span<const double> edges_;
     double mean_radius_;
     int count_;
-    std::array<std::vector<double>, max_lobes> lobes_, derivatives_;
-    std::vector<double> residual_;
+    std::array<Residuals, max_lobes> lobes_, slopes_, derivatives_;
+    Residuals residual_;
     std::array<std::array<double, max_lobes>, max_lobes> gram_{};
-    Vector target_{}, weights_{};
+    Vector target_{};
+    Best best_;
 };
 
 }  // namespace
@@ -225,19 +314,21 @@ BurleyFit fit_burley(std::span<const double> energy, std::span<const double> edg
         log_d[k] = centre + start[k];
 
     BurleyFit fit;
-    if (total > 0) {
-        std::vector<double> share(energy.begin(), energy.end());
-        for (double& e : share)
-            e /= total;
+    if (total > least_share * positive && std::isnormal(total)) {
         // Where negative light far out takes most of the moment away, non-negative lobes cannot have it.
         const bool reachable = moment > 0.9 * positive_moment;
-        Fitter fitter(std::move(share), edges_mm, reachable ? moment / total : 0, count);
+        Fitter fitter(energy, total, edges_mm, reachable ? moment / total : 0, count);
         log_d = fitter.fit(log_d);
+        double sum = 0;
         for (int k = 0; k < count; ++k)
-            fit.weight[k] = total * fitter.weights()[k];
+            sum += fitter.weights()[k];
+        for (int k = 0; k < count; ++k)
+            fit.weight[k] = total * fitter.weights()[k] / sum;
         fit.clamped = (positive - total) / total;
         fit.fit_error = fitter.l1_error();
     } else {
+        // Hardly any light is left: there is no shape to follow, but what there is must not be lost.
+        fit.weight[0] = std::isfinite(total) ? std::fmax(0.0, total) : 0;
         fit.clamped = fit.fit_error = 1;
     }
     for (int k = 0; k < count; ++k)

@@ -15,7 +15,8 @@ const double log_ratio = std::log(radius_ratio);
 /// A slope between two neighbouring ones that keeps cubics monotone (Fritsch and Carlson 1980, sufficient condition);
 /// their geometric mean, because skin's profiles fall off like powers and exponentials.
 double monotone_slope(double below, double above) {
-    return std::min({std::sqrt(below * above), 3 * below, 3 * above});
+    const double least = below < above ? 3 * below : 3 * above, mean = std::sqrt(below * above);
+    return mean < least ? mean : least;
 }
 
 /// Position of a radius among the edges of the rings: 0 at the first, 1 at the second, ...
@@ -52,6 +53,30 @@ double RadialProfile::energy_within(double radius_mm) const {
     const double t = x - k, u = 1 - t;
     return cumulative_[k] * u * u * (1 + 2 * t) + cumulative_[k + 1] * t * t * (3 - 2 * t)
          + t * u * (u * slope_[k] - t * slope_[k + 1]);
+}
+
+void RadialProfile::energy_within_ladder(double first_mm, std::span<double> out) const {
+    const double first = first_mm / unit_mm_, x = position_of(first);
+    const int count = static_cast<int>(out.size());
+    // Below the first edge, then the cubics, then everything.
+    const int inside = std::clamp(static_cast<int>(std::ceil(-x)), 0, count);
+    double share = cumulative_[0] * first / first_radius;
+    for (int i = 0; i < inside; ++i, share *= radius_ratio)
+        out[i] = std::min(share, cumulative_[0]);
+    if (inside == count)
+        return;
+    const double start = x + inside;
+    int k = std::clamp(static_cast<int>(start), 0, edges - 1);
+    const int cubics = std::min(count, inside + std::max(0, edges - 1 - k));
+    const double t = std::clamp(start - k, 0.0, 1.0), u = 1 - t;
+    const double below = u * u * (1 + 2 * t), above = t * t * (3 - 2 * t), slope_below = t * u * u, slope_above = t * t * u;
+    const double* cumulative = &cumulative_[k];
+    const double* slope = &slope_[k];
+    double* to = out.data() + inside;
+    for (int i = 0; i < cubics - inside; ++i)
+        to[i] = cumulative[i] * below + cumulative[i + 1] * above + slope_below * slope[i] - slope_above * slope[i + 1];
+    for (int i = cubics; i < count; ++i)
+        out[i] = cumulative_[edges - 1];
 }
 
 double RadialProfile::density(double radius_mm) const {

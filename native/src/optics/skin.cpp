@@ -1,9 +1,12 @@
 #include "sanguine/skin.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <numeric>
-#include <tuple>
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
 
 namespace sanguine {
 namespace {
@@ -32,22 +35,35 @@ std::vector<Chromophores> chromophores(std::span<const double> wavelengths_nm) {
 /// What one thread takes at a time: long enough to share a dermis, short enough to spread and to be cancelled.
 constexpr std::size_t max_group = 32;
 
-/// Skins of a group differ in their epidermal absorption alone.
-std::vector<std::vector<std::size_t>> group_by_dermis(std::span<const SkinParameters> skins) {
-    const auto key = [&](std::size_t i) {
-        const SkinParameters& s = skins[i];
-        return std::tuple(s.epidermis_thickness_mm, s.scatter_scale, s.hemoglobin, s.oxygenation, s.vessel_radius_mm,
-                          s.bilirubin_umol_per_l);
-    };
-    std::vector<std::size_t> order(skins.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+/// The dermal arguments of a skin at all wavelengths, in one number. Two dermises may share it by accident: it only
+/// says which skins are worth doing side by side.
+std::uint64_t dermis_hash(const SkinParameters& skin, std::span<const Chromophores> pure) {
+    std::uint64_t hash = 0;
+    for (const Chromophores& c : pure) {
+        const TablePoint p = table_point(skin, c);
+        for (const double value : {p.tau, p.a2}) {
+            hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15ULL;
+            hash ^= hash >> 32;
+        }
+    }
+    return hash;
+}
+
+/// Skins of a group most likely differ in their epidermal absorption alone.
+std::vector<std::vector<std::size_t>> group_by_dermis(std::span<const SkinParameters> skins,
+                                                      std::span<const Chromophores> pure) {
+    std::vector<std::pair<std::uint64_t, std::size_t>> order(skins.size());
+    for (std::size_t i = 0; i < skins.size(); ++i)
+        order[i] = {dermis_hash(skins[i], pure), i};
+    std::sort(order.begin(), order.end());
 
     std::vector<std::vector<std::size_t>> groups;
-    for (const std::size_t i : order) {
-        if (groups.empty() || groups.back().size() == max_group || key(groups.back().front()) != key(i))
+    std::uint64_t last = 0;
+    for (const auto& [hash, i] : order) {
+        if (groups.empty() || groups.back().size() == max_group || hash != last)
             groups.emplace_back();
         groups.back().push_back(i);
+        last = hash;
     }
     return groups;
 }
@@ -56,7 +72,7 @@ std::vector<std::vector<std::size_t>> group_by_dermis(std::span<const SkinParame
 
 std::vector<double> reflectance(std::span<const SkinParameters> skins, std::span<const double> wavelengths_nm,
                                 int threads, const Progress& progress) {
-    const PathTable& table = PathTable::embedded();
+    const PathTable& table = PathTable::embedded(Incidence::diffuse);
     const std::vector<Chromophores> pure = chromophores(wavelengths_nm);
     std::vector<double> out(skins.size() * pure.size());
     parallel_for(skins.size(), threads, progress, [&](std::size_t i) {
@@ -70,18 +86,21 @@ std::vector<double> reflectance(std::span<const SkinParameters> skins, std::span
 
 void solve_profiles(std::span<const SkinParameters> skins, std::span<const double> wavelengths_nm, int threads,
                     const Progress& progress, const ProfileVisitor& visit) {
-    const PathTable& table = PathTable::embedded();
+    const PathTable& table = PathTable::embedded(Incidence::diffuse);
     const std::vector<Chromophores> pure = chromophores(wavelengths_nm);
-    const auto groups = group_by_dermis(skins);
+    const auto groups = group_by_dermis(skins, pure);
     parallel_for(groups.size(), threads, progress, [&](std::size_t g) {
         PathTable::DermisSums dermis;
         std::array<double, path_grid::rings> energy;
         for (std::size_t w = 0; w < pure.size(); ++w) {
-            const TablePoint shared = table_point(skins[groups[g].front()], pure[w]);
-            table.sum_dermis(shared.tau, shared.a2, dermis);
+            TablePoint summed{-1, -1, -1, -1};
             for (const std::size_t i : groups[g]) {
-                table.ring_energies(dermis, table_point(skins[i], pure[w]).a1, energy);
-                visit(i, w, RadialProfile(energy, shared.unit_mm));
+                const TablePoint p = table_point(skins[i], pure[w]);
+                if (p.tau != summed.tau || p.a2 != summed.a2)
+                    table.sum_dermis(p.tau, p.a2, dermis);
+                summed = p;
+                table.ring_energies(dermis, p.a1, energy);
+                visit(i, w, RadialProfile(energy, p.unit_mm));
             }
         }
     });
@@ -96,12 +115,16 @@ std::vector<double> default_radii_mm() {
     return radii;
 }
 
+constexpr std::size_t max_rgb_rings = 80;
+
 std::span<const double> rgb_ring_edges_mm() {
     // 0.0005 mm, well inside the first ring of every wavelength, to 60 mm, outside the last of the reddest.
     static const std::vector<double> edges = [] {
         std::vector<double> out;
         for (double r = 0.0005; r < 60; r *= path_grid::radius_ratio)
             out.push_back(r);
+        if (out.size() > max_rgb_rings)
+            throw std::logic_error("rgb_ring_edges_mm: more than max_rgb_rings");
         return out;
     }();
     return edges;
@@ -127,12 +150,15 @@ std::vector<RgbRings> rgb_rings(std::span<const SkinParameters> skins, const Mat
     std::vector<RgbRings> out(skins.size(), RgbRings(edges.size()));
     solve_profiles(skins, wavelengths, threads, progress,
                    [&](std::size_t i, std::size_t w, const RadialProfile& profile) {
+                       std::array<double, max_rgb_rings> within;
+                       profile.energy_within_ladder(edges[0], std::span(within).first(edges.size()));
                        double inside = 0;
+                       Colour* ring = out[i].data();
                        for (std::size_t k = 0; k < edges.size(); ++k) {
-                           const double within = profile.energy_within(edges[k]), ring = within - inside;
-                           inside = within;
+                           const double energy = within[k] - inside;
+                           inside = within[k];
                            for (int c = 0; c < 3; ++c)
-                               out[i][k][c] += weights[w][c] * ring;
+                               ring[k][c] += weights[w][c] * energy;
                        }
                    });
     return out;
