@@ -39,9 +39,18 @@ std::vector<SkinParameters> skins_from(const TableIn& rows) {
     return skins;
 }
 
+/// Colours are sums: one NaN or infinity would be in all of them.
+template <class Array> void require_finite(const char* name, const Array& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+        if (!std::isfinite(values.data()[i]))
+            throw std::invalid_argument(std::string(name) + ": " + std::to_string(values.data()[i]) + " at " + std::to_string(i)
+                                        + " is not a finite number");
+}
+
 Matrix3 rgb_matrix(const SpaceIn& space) {
     if (const auto* name = std::get_if<std::string>(&space))
         return rgb_from_xyz(*name);
+    require_finite("working_space", std::get<MatrixIn>(space));
     const double* m = std::get<MatrixIn>(space).data();
     return {{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}}};
 }
@@ -157,6 +166,7 @@ ArrayOut<2> py_xyz(const TableIn& spectra, const VectorIn& wavelengths_nm) {
     if (spectra.shape(1) != weights.size())
         throw std::invalid_argument("spectra: " + std::to_string(spectra.shape(1)) + " columns, needs "
                                     + std::to_string(weights.size()) + ", one per wavelength");
+    require_finite("spectra", spectra);
     std::vector<double> out(spectra.shape(0) * 3);
     for (std::size_t i = 0; i < spectra.shape(0); ++i)
         for (std::size_t w = 0; w < weights.size(); ++w)
@@ -166,6 +176,7 @@ ArrayOut<2> py_xyz(const TableIn& spectra, const VectorIn& wavelengths_nm) {
 }
 
 template <class Function> ArrayOut<2> map_colours(const ColoursIn& colours, Function&& function) {
+    require_finite("xyz", colours);
     std::vector<double> out;
     out.reserve(colours.size());
     for (std::size_t i = 0; i < colours.shape(0); ++i) {

@@ -81,6 +81,8 @@ TEST_P(AgainstReference, ProfileWithinTheNoiseAskedFor) {
     const Solution s = monte_carlo_solver().solve({c.layers, c.incidence, radii_of(c)}, one_thread(0.03));
     EXPECT_LT(l1_error(s.R_per_mm2, c.rings), 0.06 * 1.6);
     EXPECT_LE(s.error_estimate, 0.03);
+    // Exact in the solver, so only the reference's error is left; of nine digits where it is none.
+    EXPECT_NEAR(s.R_unscattered, c.unscattered_reflectance, 4 * c.unscattered_reflectance_se + 1e-8);
     EXPECT_TRUE(s.warnings.empty());
     EXPECT_EQ(s.T_per_mm2.empty(), c.bottom_rings.empty());
     if (!c.bottom_rings.empty()) {
@@ -130,6 +132,14 @@ TEST(MonteCarlo, StandardErrorsCoverTheTruth) {
             EXPECT_GT(chi2_T, 60);
             EXPECT_LT(chi2_T, 149.4);
         }
+    }
+}
+
+TEST(MonteCarlo, WhatNothingAbsorbsLeaves) {
+    const reference::Case& c = reference::find("p12");
+    for (const Incidence incidence : {Incidence::normal, Incidence::diffuse}) {
+        const Solution s = monte_carlo_solver().solve({c.layers, incidence, {}}, one_thread(0.05));
+        EXPECT_NEAR(s.specular + s.Rd + s.R_unscattered + s.Tt, 1, 1e-9);
     }
 }
 

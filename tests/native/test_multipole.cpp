@@ -290,7 +290,7 @@ TEST(Multipole, ErrorsAgainstMonteCarlo) {
         try {
             double ms = 1e9;
             Solution solution;
-            for (int repeat = 0; repeat < 3; ++repeat) {
+            for (int repeat = 0; repeat < 7; ++repeat) {
                 const auto start = std::chrono::steady_clock::now();
                 solution = multipole_solver().solve(problem, {});
                 ms = std::min(ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -304,6 +304,20 @@ TEST(Multipole, ErrorsAgainstMonteCarlo) {
                 EXPECT_GE(solution.R_per_mm2[i], 0);
             }
             EXPECT_NEAR(solution.specular, c.specular, 2e-6);
+            // The estimate of the totals is the truth, but for 0.002 that it adds, 0.002 that adding-doubling may be
+            // off, and the noise of the Monte Carlo.
+            double truth = std::fabs(solution.Rd / c.scattered_reflectance - 1);
+            double noise = c.scattered_reflectance_se / c.scattered_reflectance;
+            if (c.transmittance > 0) {
+                truth = std::max(truth, std::fabs(solution.Tt / c.transmittance - 1));
+                noise = std::max(noise, c.transmittance_se / c.transmittance);
+            }
+            const double estimate = answer(c.layers, {}, c.incidence).error_estimate;
+            EXPECT_NEAR(estimate, truth, (1 + truth) * (0.004 + 3 * noise));
+            if (!says(solution, "source lies below") && !says(solution, "absorbs more"))
+                EXPECT_GE(solution.error_estimate, off / all);
+            else
+                EXPECT_GE(solution.error_estimate, 1);
             std::printf("%-5s %-28s %9.5f %9.5f %8.1f %8.1f %8.1f %7.2f  est %.3g\n", c.id, c.kind, solution.Rd,
                         c.scattered_reflectance, 100 * (solution.Rd / c.scattered_reflectance - 1),
                         c.transmittance > 0 ? 100 * (solution.Tt / c.transmittance - 1) : 0, 100 * off / all, ms,
@@ -352,7 +366,7 @@ TEST(Multipole, ExtremesAnswerOrRefuse) {
                                    .radii_mm = {1e-4, 0.1, 50}});
     std::mt19937 random(5);
     const auto pick = [&](const auto& values) { return values[random() % std::size(values)]; };
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < 2500; ++i) {
         Problem problem{.layers = {}, .radii_mm = {1e-4, 0.01, 1, 50}};
         const std::size_t count = 1 + random() % max_layers;
         for (std::size_t k = 0; k < count; ++k)

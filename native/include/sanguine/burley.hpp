@@ -24,7 +24,8 @@ struct BurleyFit {
     double fit_error;  ///< L1 norm over the plane of lobes minus profile, over the channel's reflectance; 1 likewise
 };
 
-/// Fits lobes to the energies (signed) in rings with outer radii `edges_mm`; `count` is 1 to max_lobes.
+/// Fits lobes to the energies (signed) in rings with outer radii `edges_mm`; `count` is 1 to max_lobes. Throws
+/// std::invalid_argument where the energies do not add up to a finite number.
 ///
 /// Least squares over the rings, which are logarithmic, and over the mean radius, which decides how much light there is
 /// beyond a shadow's edge. Weights are the exact solution of the small quadratic problem

@@ -37,7 +37,7 @@ struct Tallies {
     std::uint64_t photons = 0;
     std::uint64_t collisions = 0, faces = 0;  ///< of all photons together: the work done
     double specular = 0;                      ///< Fresnel's, not sampled
-    Estimate Rd, R_unscattered, Tt;
+    Estimate Rd, R_unscattered, Tt;           ///< all sampled
     Estimate Tt_scattered;
     Estimate cut;           ///< still inside when a photon reached its cap of steps; in none of the others
     std::vector<Estimate> R_rings, T_rings;   ///< energy per ring of scattered light; their sums are Rd and Tt_scattered
@@ -62,7 +62,8 @@ struct RadialDensity {
 std::vector<RadialDensity> radial_density(const RadialRings& rings, std::span<const Estimate> energy,
                                           std::span<const double> radii_mm);
 
-/// The rung of the ladder. Runs rounds of photons until three standard errors of Rd and of Tt are within the relative
+/// The rung of the ladder. What never scatters is exact (unscattered.hpp), and no more scattered light leaves than that
+/// leaves over. Runs rounds of photons until three standard errors of Rd and of Tt are within the relative
 /// tolerance and the expected L1 noise of each asked profile (mean absolute deviation of the windows above, over their
 /// energy) is within twice the tolerance; shares below 0.001 of the incident light count as 0.001. `error_estimate` is
 /// the largest of the three relative errors, the L1 noise halved, plus the share that a cap of steps cut off.

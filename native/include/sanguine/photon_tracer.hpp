@@ -18,13 +18,14 @@ public:
         : state_(mix(seed ^ mix(photon))), increment_(mix(state_ + photon) | 1) {}
 
     /// Uniform in the open interval (0, 1): its logarithm is finite.
-    double uniform() {
+    double uniform() { return (bits() + 0.5) * 0x1p-32; }
+
+    std::uint32_t bits() {
         const std::uint64_t old = state_;
         state_ = old * 6364136223846793005ULL + increment_;
         const auto shifted = static_cast<std::uint32_t>(((old >> 18) ^ old) >> 27);
         const auto turn = static_cast<std::uint32_t>(old >> 59);
-        const std::uint32_t bits = (shifted >> turn) | (shifted << ((32 - turn) & 31));
-        return (bits + 0.5) * 0x1p-32;
+        return (shifted >> turn) | (shifted << ((32 - turn) & 31));
     }
 
 private:

@@ -308,6 +308,8 @@ BurleyFit fit_burley(std::span<const double> energy, std::span<const double> edg
         positive_moment += energy[i] * middle;
         log_radius += energy[i] * std::log(middle);
     }
+    if (!std::isfinite(total) || !std::isfinite(positive))
+        throw std::invalid_argument("energy: the rings do not add up to a finite number");
     const double centre = positive > 0 ? log_radius / positive : 0;
     Vector log_d{};
     for (int k = 0; k < count; ++k)

@@ -16,7 +16,9 @@ void parallel_for(std::size_t count, int threads, const Progress& progress,
     if (threads < 0)
         throw std::invalid_argument("threads: " + std::to_string(threads) + " is below 0 (0: all cores)");
     const std::size_t wanted = threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
-    const std::size_t workers = std::min(count, wanted);
+    // Beyond the largest machines' cores more threads only cost; a number by mistake must not exhaust the system.
+    constexpr std::size_t most = 512;
+    const std::size_t workers = std::min({count, wanted, most});
 
     std::atomic<std::size_t> next = 0, done = 0;
     std::atomic<bool> stop = false;

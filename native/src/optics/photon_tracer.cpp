@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "sanguine/fresnel.hpp"
 
@@ -127,6 +128,48 @@ PhotonEnd trace_photon(std::span<const Layer> stack, Incidence incidence, Photon
 
 namespace {
 
+/// max(0, x), which std::fmax would call the library for.
+double positive(double x) {
+    return x > 0 ? x : 0;
+}
+
+/// A point on the unit circle: an angle within pi / 4 by its Taylor series, exact to 1e-10, and one of four quadrants.
+/// Without the branches of a rejection, which are mispredicted every fifth time, it runs beside what else a turn needs.
+void sample_azimuth(PhotonRandom& random, double& cosine, double& sine) {
+    const std::uint32_t bits = random.bits();
+    const double y = (static_cast<std::int32_t>(bits) + 0.5) * (0x1p-31 * std::numbers::pi / 4), y2 = y * y;
+    const double s = y * (1 - y2 / 6 * (1 - y2 / 20 * (1 - y2 / 42 * (1 - y2 / 72 * (1 - y2 / 110)))));
+    const double c = 1 - y2 / 2 * (1 - y2 / 12 * (1 - y2 / 30 * (1 - y2 / 56 * (1 - y2 / 90))));
+    // The last bits choose the quadrant; the angle is coarser than 2^-30 by them, and nobody sees it.
+    const double first = bits & 1 ? s : c, second = bits & 1 ? c : s;
+    cosine = bits & 2 ? -first : first;
+    sine = bits & 2 ? second : -second;
+}
+
+/// `scatter` with that azimuth.
+void turn(Vector& d, double g, PhotonRandom& random) {
+    double cos_theta = 2 * random.uniform() - 1;
+    if (g != 0) {
+        const double t = (1 - g * g) / (1 + g * cos_theta);
+        cos_theta = (1 + g * g - t * t) / (2 * g);
+    }
+    const double sin_theta = std::sqrt(positive(1 - cos_theta * cos_theta));
+    double u, v;
+    sample_azimuth(random, u, v);
+    u *= sin_theta;
+    v *= sin_theta;
+
+    const double sign = std::copysign(1.0, d.z);
+    const double c = -1 / (sign + d.z), e = d.x * d.y * c;
+    const Vector turned = {
+        u * (1 + sign * d.x * d.x * c) + v * e + cos_theta * d.x,
+        u * sign * e + v * (sign + d.y * d.y * c) + cos_theta * d.y,
+        -u * sign * d.x - v * d.y + cos_theta * d.z,
+    };
+    const double unit = 1.5 - 0.5 * (turned.x * turned.x + turned.y * turned.y + turned.z * turned.z);
+    d = {turned.x * unit, turned.y * unit, turned.z * unit};
+}
+
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Optical depth from which a ray counts as endless: what would pass is below the resolution of the random numbers.
@@ -197,7 +240,7 @@ WeightedWalk::Stop WeightedWalk::fly(Ray& ray, double optical_depth, PhotonRando
     for (std::uint32_t crossed = 0; crossed < max_steps_; ++crossed) {
         const Medium& here = media_[ray.layer];
         Vector& d = ray.d;
-        const double way = here.mu_c > 0 ? std::fmax(0.0, optical_depth - ray.tau) * here.inverse_mu_c : infinity;
+        const double way = here.mu_c > 0 ? positive(optical_depth - ray.tau) * here.inverse_mu_c : infinity;
         const double there = ray.depth + d.z * way;
         if (there >= 0 && there < here.thickness) {
             ray.x += d.x * way;
@@ -222,7 +265,7 @@ WeightedWalk::Stop WeightedWalk::fly(Ray& ray, double optical_depth, PhotonRando
 
         const double ratio = here.ratio[down];
         if (ratio != 1) {
-            const double cosine = std::fabs(d.z), sine2 = std::fmax(0.0, 1 - cosine * cosine);
+            const double cosine = std::fabs(d.z), sine2 = positive(1 - cosine * cosine);
             const double refracted2 = ratio * ratio * sine2;
             if (refracted2 >= 1) {
                 d.z = -d.z;
@@ -231,7 +274,7 @@ WeightedWalk::Stop WeightedWalk::fly(Ray& ray, double optical_depth, PhotonRando
                     // Held at both faces: unfold the reflections. The way to the collision ends at this depth below
                     // or above the face, modulo two thicknesses.
                     const double rest =
-                        here.mu_c > 0 ? std::fmax(0.0, optical_depth - ray.tau) * here.inverse_mu_c : infinity;
+                        here.mu_c > 0 ? positive(optical_depth - ray.tau) * here.inverse_mu_c : infinity;
                     if (!(rest < infinity))
                         return here.absorption > 0 ? Stop::killed : Stop::capped;
                     ray.x += d.x * rest;
@@ -319,7 +362,7 @@ WeightedEnd WeightedWalk::trace(std::uint64_t seed, std::uint64_t photon) const 
             stop = Stop::capped;
             break;
         }
-        scatter(ray.d, media_[ray.layer].g, random);
+        turn(ray.d, media_[ray.layer].g, random);
         stop = fly(ray, -std::log(random.uniform()), random);
     }
     end.faces += ray.faces;

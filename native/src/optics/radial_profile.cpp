@@ -81,9 +81,10 @@ void RadialProfile::energy_within_ladder(double first_mm, std::span<double> out)
 
 double RadialProfile::density(double radius_mm) const {
     const double radius = radius_mm / unit_mm_;
-    const double per_ring_to_mm2 = 1 / (2 * std::numbers::pi * radius_mm * radius_mm * log_ratio);
+    // The density falls as 1/r; a radius whose square underflows has one too, and below 1e-300 mm it has that of 1e-300.
     if (radius <= first_radius)
-        return cumulative_[0] * radius / first_radius * log_ratio * per_ring_to_mm2;
+        return cumulative_[0] / (2 * std::numbers::pi * first_radius * unit_mm_ * std::max(radius_mm, 1e-300));
+    const double per_ring_to_mm2 = 1 / (2 * std::numbers::pi * radius_mm * radius_mm * log_ratio);
     const double x = position_of(radius);
     if (x >= edges - 1)
         return 0;

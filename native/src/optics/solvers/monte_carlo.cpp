@@ -10,6 +10,7 @@
 
 #include "message.hpp"
 #include "sanguine/photon_tracer.hpp"
+#include "sanguine/unscattered.hpp"
 
 namespace sanguine {
 namespace {
@@ -195,10 +196,10 @@ double relative_noise(std::span<const RadialDensity> profile) {
     return deviation / std::fmax(energy, small_share);
 }
 
-std::vector<double> densities(std::span<const RadialDensity> profile) {
+std::vector<double> densities(std::span<const RadialDensity> profile, double scale) {
     std::vector<double> result;
     for (const RadialDensity& d : profile)
-        result.push_back(d.per_mm2);
+        result.push_back(scale * d.per_mm2);
     return result;
 }
 
@@ -226,6 +227,11 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
     const bool all_returns = returns_all(stack);
     const bool scatters = std::any_of(stack.begin(), stack.end(), [](const Layer& layer) { return layer.mu_s > 0; });
 
+    const bool keeps_all =
+        (all_returns || has_bottom)
+        && std::all_of(stack.begin(), stack.end(), [](const Layer& layer) { return layer.mu_a == 0; });
+    const UnscatteredLight light = unscattered(stack, problem.incidence);
+
     // A window may reach 1.25^1.5 beyond a radius.
     RadialRings rings(1, 1);
     if (!radii.empty())
@@ -241,16 +247,22 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
     std::uint64_t target = std::min(first_round, effort.max_photons);
     Tallies t;
     std::vector<RadialDensity> top, bottom;
-    double totals_error, profile_error, expected = 4.0 * first_round;
+    double kept, totals_error, profile_error, expected = 4.0 * first_round;
     bool in_time;
     for (;;) {
         in_time = run.continue_to(target, static_cast<std::uint64_t>(std::fmin(expected, effort.max_photons)), deadline,
                                   effort.progress);
         t = run.tallies();
+        // What never scattered is known exactly, and with it what there is to share: all of it leaves where nothing
+        // absorbs, at most all of it elsewhere. The sampled shares are off by their noise alone.
+        const double out = t.Rd.mean + t.Tt_scattered.mean;
+        kept = out > light.scattered ? light.scattered / out : 1;
+        if (keeps_all && out > 0)
+            kept = light.scattered / (out + t.cut.mean);
+        t.Rd.mean = kept * (t.Rd.mean + (all_returns ? t.cut.mean : 0));
+        t.Tt = {light.transmitted + kept * t.Tt_scattered.mean, t.Tt_scattered.standard_error};
         if (all_returns) {
-            t.Rd.mean += t.cut.mean;
-            // Of what entered and will leave, only the unscattered part is random.
-            t.Rd.standard_error = t.R_unscattered.standard_error;
+            t.Rd.standard_error = 0;
         } else if (scatters) {
             t.Rd = at_least_one_photon(t.Rd, t.photons);
             t.Tt = at_least_one_photon(t.Tt, t.photons);
@@ -273,12 +285,12 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
     Solution s;
     s.solver = id();
     s.Rd = t.Rd.mean;
-    s.R_unscattered = t.R_unscattered.mean;
+    s.R_unscattered = light.reflected;
     s.Tt = has_bottom ? t.Tt.mean : 0;
-    s.specular = t.specular;
-    s.R_per_mm2 = densities(top);
+    s.specular = light.specular;
+    s.R_per_mm2 = densities(top, kept);
     if (has_bottom)
-        s.T_per_mm2 = densities(bottom);
+        s.T_per_mm2 = densities(bottom, kept);
     // Cut light would have been absorbed, or left somewhere: all of it may be missing.
     const double cut = t.cut.mean / std::fmax(t.Rd.mean, small_share);
     s.error_estimate = std::fmax(totals_error + (all_returns ? 0 : cut), profile_error / 2 + (radii.empty() ? 0 : cut));

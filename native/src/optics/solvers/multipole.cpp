@@ -5,6 +5,7 @@
 #include <string>
 
 #include "message.hpp"
+#include "sanguine/adding_doubling.hpp"
 #include "sanguine/fresnel.hpp"
 #include "sanguine/hankel.hpp"
 
@@ -13,6 +14,11 @@ namespace {
 
 /// A free path of a thousand kilometres and more is no scattering, and its square no number to count with.
 constexpr double clear_below_per_mm = 1e-9;
+
+/// Streams of the adding-doubling that the totals are held against, and its own relative error with so many: 0.16 %
+/// over 38 stacks, skin and slabs (measured against Monte Carlo).
+constexpr int check_streams = 16;
+constexpr double check_error = 0.002;
 
 double reduced_scattering(const Layer& layer) { return layer.mu_s * (1 - layer.g); }
 
@@ -66,6 +72,31 @@ double cut_negative(std::span<const double> radii, std::span<const HankelResult>
         profile.push_back(scale * std::fmax(value, 0.0));
     }
     return all > 0 ? negative / all : 0;
+}
+
+/// Sets `error_estimate`, and warns of differences above `tolerance`.
+void hold_against_adding_doubling(const Problem& problem, double tolerance, Solution& solution) {
+    Totals exact;
+    try {
+        exact = adding_doubling(problem.layers, problem.incidence, check_streams);
+    } catch (const SolverError& error) {
+        solution.error_estimate = 1;
+        solution.warnings.push_back(message("the error could not be measured: ", error.what()));
+        return;
+    }
+    const auto compare = [&](const char* name, double value, double right) {
+        // Where there is no light but that of the method (right = 0), it is all error.
+        // Next to a vanishing number a ratio need not be finite.
+        const double off = right > 0 ? std::fmin(value / right - 1, 1e6) : value > 0 ? 1 : 0;
+        if (std::fabs(off) > tolerance + check_error)
+            solution.warnings.push_back(message(name, " is ", 100 * std::fabs(off), " % ", off > 0 ? "above" : "below",
+                                                " that of adding-doubling, ", right));
+        solution.error_estimate = std::fmax(solution.error_estimate, std::fabs(off));
+    };
+    compare("Rd", solution.Rd, exact.Rd);
+    if (problem.layers.back().thickness != half_space)
+        compare("Tt", solution.Tt, exact.Tt);
+    solution.error_estimate += check_error;
 }
 
 }  // namespace
@@ -162,20 +193,21 @@ std::string Multipole::unsuited(const Problem& problem) const {
     return {};
 }
 
-Solution Multipole::solve(const Problem& problem, const Effort&) const {
+Solution Multipole::solve(const Problem& problem, const Effort& effort) const {
     const MultipoleStack stack(problem.layers);
     const bool finite = problem.layers.back().thickness != half_space;
     Solution solution;
     solution.solver = id();
     solution.specular = first_surface(problem);
-    solution.error_estimate = unmeasured_error;
     const double entering = 1 - solution.specular;
 
     // What each layer does by itself says where the method has left its ground.
+    bool off_ground = false;
     for (std::size_t i = 0; i < stack.layers().size(); ++i) {
         const MultipoleLayer& layer = stack.layers()[i];
         const double paths = layer.thickness / layer.source_depth;
         const MultipoleResponse alone = layer(0);
+        off_ground = off_ground || paths < 1 || layer.reduced_albedo < 0.5;
         if (paths < 1)
             solution.warnings.push_back(
                 message("layer ", i, " is ", paths, " mean free paths thick: its source lies below its bottom, and by itself "
@@ -203,6 +235,7 @@ Solution Multipole::solve(const Problem& problem, const Effort&) const {
         fail(message("more light out than in, by ", total.R + total.T - 1));
     solution.Rd = entering * total.R;
     solution.Tt = finite ? entering * total.T : 0;
+    hold_against_adding_doubling(problem, effort.tolerance, solution);
 
     if (!problem.radii_mm.empty()) {
         const auto results = inverse_hankel(
@@ -221,6 +254,7 @@ Solution Multipole::solve(const Problem& problem, const Effort&) const {
         keep(0, "R", solution.R_per_mm2);
         if (finite)
             keep(1, "T", solution.T_per_mm2);
+        solution.error_estimate += off_ground ? profile_error_off_ground : profile_error;
         const double l = stack.layers().front().source_depth;
         if (problem.radii_mm.front() < l)
             solution.warnings.push_back(message("R(r) inside of r = ", l, " mm, one mean free path, is not diffusion"));
