@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import sanguine_core as core
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, assume, settings
 from hypothesis import strategies as st
 
 SOAK = False
@@ -99,6 +99,21 @@ def moderate_stacks(most: int = 3, half_spaces: bool = False) -> st.SearchStrate
     return st.tuples(finite, st.booleans()).map(
         lambda pair: (*pair[0][:-1], (*pair[0][-1][:4], math.inf if pair[1] else pair[0][-1][4]))
     )
+
+
+@st.composite
+def skin_stacks(draw) -> tuple[Layer, ...]:
+    """What the skin table holds, and a little beyond: two layers of n 1.4 and g 0.8 (sometimes nearly), or the dermis
+    alone."""
+    mu_s = draw(magnitudes(1.0, 200.0))
+    g = draw(st.sampled_from([0.8, 0.8, 0.8, 0.799, 0.8019]))
+    n = draw(st.sampled_from([1.4, 1.4, 1.4, 1.3995, 1.4009]))
+    scattering = mu_s * (1 - g)
+    ratio = draw(st.sampled_from([0.5, 0.5, 0.495, 0.2, 1.0, 3.0]))
+    epidermis = (draw(magnitudes(1e-5, 1e5)) * scattering, mu_s, g, n, draw(magnitudes(1e-6, 1e3)) / scattering)
+    dermis = (draw(magnitudes(1e-5, 1e5)) * scattering * ratio, mu_s * ratio, g, n, math.inf)
+    assume(epidermis[0] <= 1e6 and dermis[0] <= 1e6)
+    return (dermis,) if draw(st.integers(0, 4)) == 0 else (epidermis, dermis)
 
 
 INCIDENCES = ("normal", "diffuse")

@@ -93,6 +93,9 @@ void check_problem(const Problem& problem, const Effort& effort) {
         throw std::invalid_argument("max_seconds: " + std::to_string(effort.max_seconds) + " is not above 0");
     if (effort.max_photons == 0)
         throw std::invalid_argument("max_photons: 0 is not above 0");
+    // Not every rung starts threads, but what is nonsense to one is nonsense to all.
+    if (effort.threads < 0)
+        throw std::invalid_argument("threads: " + std::to_string(effort.threads) + " is below 0 (0: all cores)");
 }
 
 /// What every answer has to be, whoever gave it. Energy may exceed 1 by rounding alone.
@@ -106,7 +109,7 @@ void check_solution(const Solution& s) {
     }
     if (!std::ranges::all_of(s.R_per_mm2, density) || !std::ranges::all_of(s.T_per_mm2, density))
         throw SolverError(s.solver + ": no physical answer: a profile is negative or not finite");
-    if (!(s.error_estimate >= 0))
+    if (!(s.error_estimate >= 0 && std::isfinite(s.error_estimate)))
         throw SolverError(s.solver + ": no physical answer: its error is unknown");
 }
 
