@@ -62,6 +62,15 @@ def _parser() -> argparse.ArgumentParser:
                        help="per case; a solver that stops early says so (default %(default)s)")
     solve.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    fit = _verb(verbs, "fit", _fit, "what is in a skin: parameters and their standard errors from measured reflectance")
+    fit.add_argument("spectra", metavar="SPECTRA.csv", help="a header id,380,390,… (nm), then reflectance 0 to 1")
+    fit.add_argument("--specular", default="auto", choices=("auto", "included", "excluded"),
+                     help="whether the surface's reflection is in the spectra (SCI) or not (SCE, `sanguine skin`); auto: "
+                          "included, unless the model explains them perfectly without (default %(default)s)")
+    fit.add_argument("--free", default="", metavar="ID,…",
+                     help="let these go where the data lead, for example melanin_blend or bilirubin_umol_per_l")
+    fit.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     plan = _verb(verbs, "plan", _plan, "what a shot will simulate, and why, without doing it")
     plan.add_argument("shot", metavar="SHOT.toml")
     plan.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
@@ -115,6 +124,20 @@ def _solve(options: argparse.Namespace) -> int:
     for result in unsolved:
         print(f"sanguine: {options.cases}: {result['id']}: {result['error']}", file=sys.stderr)
     return 1 if unsolved else 0
+
+
+def _fit(options: argparse.Namespace) -> int:
+    from ..app.fitting import fit_report, read_spectra
+    from .progress import reporter
+
+    spectra = read_spectra(options.spectra)
+    free = [name for name in options.free.split(",") if name]
+    with reporter(options.json_progress) as progress:
+        report = fit_report(spectra, options.specular, free, lambda done, total: progress("fit", done, total) or True)
+    if options.specular == "auto":
+        print(f"sanguine: specular taken as {report['specular']} (--specular says otherwise)", file=sys.stderr)
+    _answer(report, options.out)
+    return 0
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -16,9 +16,10 @@ struct Counters {
     Counter lobe_fits{"lobe_fits"};                  ///< fits: skins x channels
     Counter stack_solves{"stack_solves"};            ///< layered stacks, whatever the solver
     Counter texels_rasterized{"texels_rasterized"};  ///< pixels of drawn maps, each channel once
+    Counter spectra_fitted{"spectra_fitted"};        ///< measured spectra
 
-    std::array<Counter*, 5> all() {
-        return {&spectral_solves, &profile_solves, &lobe_fits, &stack_solves, &texels_rasterized};
+    std::array<Counter*, 6> all() {
+        return {&spectral_solves, &profile_solves, &lobe_fits, &stack_solves, &texels_rasterized, &spectra_fitted};
     }
 };
 

@@ -161,8 +161,14 @@ ArrayOut<3> py_radial_profile(const TableIn& rows, const VectorIn& wavelengths_n
     return to_numpy<3>(std::move(out), {skins.size(), waves, radii});
 }
 
-ArrayOut<2> py_xyz(const TableIn& spectra, const VectorIn& wavelengths_nm) {
-    const std::vector<Colour> weights = xyz_weights(view(wavelengths_nm));
+Illuminant illuminant_of(const std::string& name) {
+    if (name != "D65" && name != "A")
+        throw std::invalid_argument("illuminant: " + name + " is unknown, D65 or A");
+    return name == "A" ? Illuminant::a : Illuminant::d65;
+}
+
+ArrayOut<2> py_xyz(const TableIn& spectra, const VectorIn& wavelengths_nm, const std::string& illuminant) {
+    const std::vector<Colour> weights = xyz_weights(view(wavelengths_nm), illuminant_of(illuminant));
     if (spectra.shape(1) != weights.size())
         throw std::invalid_argument("spectra: " + std::to_string(spectra.shape(1)) + " columns, needs "
                                     + std::to_string(weights.size()) + ", one per wavelength");
@@ -184,6 +190,17 @@ template <class Function> ArrayOut<2> map_colours(const ColoursIn& colours, Func
         out.insert(out.end(), mapped.begin(), mapped.end());
     }
     return to_numpy<2>(std::move(out), {colours.shape(0), 3});
+}
+
+ArrayOut<1> py_delta_e_2000(const ColoursIn& lab_1, const ColoursIn& lab_2) {
+    if (lab_1.shape(0) != lab_2.shape(0))
+        throw std::invalid_argument("lab_2: " + std::to_string(lab_2.shape(0)) + " rows, needs "
+                                    + std::to_string(lab_1.shape(0)) + ", as many as lab_1");
+    std::vector<double> out;
+    for (std::size_t i = 0; i < lab_1.shape(0); ++i)
+        out.push_back(delta_e_2000({lab_1(i, 0), lab_1(i, 1), lab_1(i, 2)}, {lab_2(i, 0), lab_2(i, 1), lab_2(i, 2)}));
+    const std::size_t count = out.size();
+    return to_numpy<1>(std::move(out), {count});
 }
 
 nb::dict py_burley_lobes(const TableIn& rows, const SpaceIn& working_space, int lobe_count, int threads,
@@ -251,10 +268,15 @@ void bind_optics(nb::module_& m) {
           "progress"_a = nb::none(),
           "R(r) [1/mm^2], (N, W, R), for Lambertian light on one point; its plane integral is reflectance().");
 
-    m.def("xyz", &py_xyz, "spectra"_a, "wavelengths_nm"_a,
-          "XYZ (N, 3) of reflectance spectra (N, W): D65, CIE 1931 2 degrees, Y = 100 for white.");
-    m.def("lab", [](const ColoursIn& xyz) { return map_colours(xyz, lab_from_xyz); }, "xyz"_a,
-          "CIE L*a*b* (N, 3) of XYZ (Y = 100 for white) under D65.");
+    m.def("xyz", &py_xyz, "spectra"_a, "wavelengths_nm"_a, "illuminant"_a = "D65",
+          "XYZ (N, 3) of reflectance spectra (N, W): CIE 1931 2 degrees, illuminant 'D65' or 'A', Y = 100 for white.");
+    m.def("lab",
+          [](const ColoursIn& xyz, const std::string& illuminant) {
+              const Illuminant light = illuminant_of(illuminant);
+              return map_colours(xyz, [&](const Colour& c) { return lab_from_xyz(c, light); });
+          },
+          "xyz"_a, "illuminant"_a = "D65", "CIE L*a*b* (N, 3) of XYZ (Y = 100 for white) under 'D65' or 'A'.");
+    m.def("delta_e_2000", &py_delta_e_2000, "lab_1"_a, "lab_2"_a, "CIEDE2000 differences (N,) of two (N, 3) of L*a*b*.");
     m.def("linear_rgb",
           [](const ColoursIn& xyz, const SpaceIn& working_space) {
               const Matrix3 rgb = rgb_matrix(working_space);

@@ -14,6 +14,7 @@ SPECTRA = (
     ("bilirubin.csv", "embedded_bilirubin", 2),
     ("cie_1931_2_degree.csv", "embedded_colour_matching", 4),
     ("cie_d65.csv", "embedded_illuminant_d65", 2),
+    ("cie_a.csv", "embedded_illuminant_a", 2),
 )
 PATH_TABLES = (
     ("path_table_diffuse.bin", "embedded_path_table_diffuse"),

@@ -25,7 +25,7 @@ def test_parameters_have_every_field():
         assert row["hard_min"] <= row["soft_min"] <= row["default"] <= row["soft_max"] <= row["hard_max"]
     assert IDS == [
         "melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm", "oil", "roughness",
-        "scatter_scale", "vessel_radius_mm", "bilirubin_umol_per_l",
+        "scatter_scale", "vessel_radius_mm", "bilirubin_umol_per_l", "scatter_power",
     ]  # fmt: skip
     assert [row["id"] for row in core.derived_parameters()] == ["oxyhemoglobin", "deoxyhemoglobin"]
 
@@ -89,7 +89,7 @@ def test_surface():
     [
         (lambda: core.reflectance(skins({"melanin": 0.6}), NM), ["skin 0", "melanin", "0.6", "0 to 0.5"]),
         (lambda: core.reflectance(skins({}, {"oxygenation": np.nan}), NM), ["skin 1", "oxygenation", "nan", "0 to 1"]),
-        (lambda: core.reflectance(skins({})[:, :3], NM), ["3 values", "needs 10"]),
+        (lambda: core.reflectance(skins({})[:, :3], NM), ["3 values", "needs 11"]),
         (lambda: core.reflectance(skins({}), np.array([800.0])), ["wavelengths_nm", "800", "380 to 780 nm"]),
         (lambda: core.reflectance(skins({}), NM, threads=-1), ["threads", "-1"]),
         (lambda: core.radial_profile(skins({}), NM, np.array([0.0])), ["radius_mm", "above 0"]),

@@ -39,7 +39,7 @@ def test_bare_skin_runs_scattering_alone():
 def test_constants_of_the_skin_get_no_axis_and_no_instruction(live):
     emotions = ({}, {"anger": 1.0})
     plain = make_plan(scene(emotions, live=live))
-    for change in ({"scatter_scale": 0.8}, {"vessel_radius_mm": 0.01}, {"bilirubin_umol_per_l": 40.0}):
+    for change in ({"scatter_scale": 0.8}, {"scatter_power": 0.5}, {"vessel_radius_mm": 0.01}, {"bilirubin_umol_per_l": 40.0}):
         plan = make_plan(scene(emotions, live=live, **change))
         assert plan.axes == plain.axes and plan.maps == plain.maps
         assert {k: s.source for k, s in assemble(plan).items()} == {k: s.source for k, s in assemble(plain).items()}

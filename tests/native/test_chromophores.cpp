@@ -61,7 +61,7 @@ TEST(Parameters, MessageNamesValueAndRange) {
     row[2] = 0.3;
     EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: hemoglobin: 0.3 is outside 0 to 0.25");
     row.pop_back();
-    EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: 9 values, needs 10");
+    EXPECT_EQ(message_of([&] { skin_from_row(row, 0); }), "skin 0: 10 values, needs 11");
 }
 
 TEST(Chromophores, MelaninAndBaseline) {
@@ -123,6 +123,17 @@ TEST(Chromophores, ScatterScaleMultipliesBothLayers) {
     EXPECT_EQ(o.mu_a_dermis, plain.mu_a_dermis);
 }
 
+TEST(Chromophores, ScatterPowerTurnsAbout600) {
+    SkinParameters skin;
+    skin.scatter_power = 0.6;
+    for (const double nm : {400.0, 600.0, 750.0}) {
+        const Chromophores c = chromophores_at(nm);
+        const OpticalCoefficients o = optical_coefficients(skin, c);
+        EXPECT_NEAR(o.mu_s_prime_epidermis / c.epidermis_scattering, std::pow(nm / 600, 0.6), 1e-12) << nm;
+        EXPECT_EQ(o.mu_s_prime_dermis, o.mu_s_prime_epidermis / 2);
+    }
+}
+
 TEST(Chromophores, VesselsPackTheirBlood) {
     // Factors of pure oxygenated blood by hand from the same table, mu_a = 280.1, 28.54, 29.52, 1.71 1/mm; the last
     // digit is the tolerance.
@@ -172,6 +183,9 @@ TEST(Chromophores, WhatIsOffCostsNothing) {
     skin.vessel_radius_mm = 0.01;
     optical_coefficients(skin, c, counted);
     EXPECT_EQ(calls, 1);
+    skin.scatter_power = 0.5;
+    optical_coefficients(skin, c, counted);
+    EXPECT_EQ(calls, 3);
     // And to the last bit the skin of Donner and Jensen.
     EXPECT_EQ(off.mu_a_dermis, skin.hemoglobin * std::lerp(c.deoxyhemoglobin, c.oxyhemoglobin, skin.oxygenation)
                                    + (1 - skin.hemoglobin) * c.baseline);
@@ -191,13 +205,18 @@ TEST(Chromophores, EverySkinFitsThePathTable) {
         return *std::find_if(std::begin(parameter_rows), std::end(parameter_rows),
                              [&](const auto& p) { return p.id == id; });
     };
-    const double most_scattering = row("scatter_scale").hard_max;
     const double thickest = row("epidermis_thickness_mm").hard_max;
     for (double nm = 380; nm <= 780; nm += 1) {
         const Chromophores c = chromophores_at(nm);
         const double least = std::min({c.baseline, c.eumelanin, c.pheomelanin, c.oxyhemoglobin, c.deoxyhemoglobin});
-        EXPECT_GE(least / (most_scattering * c.epidermis_scattering), path_grid::reference_absorption) << nm;
-        EXPECT_LE(thickest * most_scattering * c.epidermis_scattering, path_grid::max_thickness) << nm;
+        for (const double power : {row("scatter_power").hard_min, row("scatter_power").hard_max}) {
+            SkinParameters skin;
+            skin.scatter_scale = row("scatter_scale").hard_max;
+            skin.scatter_power = power;
+            const double mu_s_prime = optical_coefficients(skin, c).mu_s_prime_epidermis;
+            EXPECT_GE(least / mu_s_prime, path_grid::reference_absorption) << nm;
+            EXPECT_LE(thickest * mu_s_prime, path_grid::max_thickness) << nm;
+        }
     }
 }
 

@@ -13,7 +13,7 @@ EFFECT = Effect(
     help="Light that enters the skin, scatters in both layers and leaves at a distance.",
     reads=(
         "melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm", "scatter_scale",
-        "vessel_radius_mm", "bilirubin_umol_per_l",
+        "scatter_power", "vessel_radius_mm", "bilirubin_umol_per_l",
     ),
     writes=(),
     activate=_activate,

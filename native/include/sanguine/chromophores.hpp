@@ -13,6 +13,9 @@ inline constexpr double min_wavelength_nm = 380, max_wavelength_nm = 780;
 /// The dermis scatters half as much as the epidermis (Donner and Jensen 2006).
 inline constexpr double dermis_per_epidermis_scattering = 0.5;
 
+/// Where scatter_power changes nothing.
+inline constexpr double scatter_pivot_nm = 600;
+
 /// Coefficients of the pure substances at one wavelength, in 1/mm.
 struct Chromophores {
     double eumelanin, pheomelanin;              ///< absorption of melanosomes
@@ -20,6 +23,7 @@ struct Chromophores {
     double baseline;                            ///< absorption of tissue without either
     double bilirubin;                           ///< absorption per umol/L
     double epidermis_scattering;                ///< reduced scattering mu_s' of the epidermis, at scatter_scale 1
+    double log_wavelength;                      ///< ln(wavelength / scatter_pivot_nm), not a coefficient
 };
 
 /// Throws std::invalid_argument outside 380 to 780 nm.
@@ -32,20 +36,22 @@ struct OpticalCoefficients {
 };
 
 /// Absorption of blood [1/mm] as a beam of diffuse light meets it when it is gathered in vessels of `radius_mm`, per
-/// volume of blood: mu_a times (1 - exp(-2 mu_a r)) / (2 mu_a r), Svaasand et al. 1995, van Veen et al. 2002, Eq. 4.
+/// volume of blood: mu_a times (1 - exp(-2 mu_a r)) / (2 mu_a r), Svaasand et al. 1995, van Veen et al. 2002, Opt. Lett. 27:246.
 /// Needs mu_a, radius > 0.
 template <class Expm1> double packaged_absorption(double mu_a, double radius_mm, const Expm1& expm1) {
     return -expm1(-2 * mu_a * radius_mm) / (2 * radius_mm);
 }
 
-/// The mixture of the pure substances. `expm1` is called once for a skin with vessels and never for one without:
-/// what is off costs no transcendental function. Tests count the calls.
+/// The mixture of the pure substances. `expm1` is called once for vessels, once for a scatter_power, and never for a
+/// skin without either: what is off costs no transcendental function. Tests count the calls.
 template <class Expm1>
 OpticalCoefficients optical_coefficients(const SkinParameters& skin, const Chromophores& pure, const Expm1& expm1) {
     double blood = std::lerp(pure.deoxyhemoglobin, pure.oxyhemoglobin, skin.oxygenation);
     if (skin.vessel_radius_mm > 0)
         blood = packaged_absorption(blood, skin.vessel_radius_mm, expm1);
-    const double mu_s_prime = skin.scatter_scale * pure.epidermis_scattering;
+    double mu_s_prime = skin.scatter_scale * pure.epidermis_scattering;
+    if (skin.scatter_power != 0)
+        mu_s_prime *= 1 + expm1(skin.scatter_power * pure.log_wavelength);
     return {
         skin.melanin * std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend)
             + (1 - skin.melanin) * pure.baseline,

@@ -10,6 +10,25 @@ import numpy
 from numpy.typing import NDArray
 
 
+def fit_parameters() -> list:
+    """
+    What a fit may move, as dicts: id, scale (on which prior and error are normal), lower, upper, prior_mean and
+    held_at (in the unit of the parameter; None where it is fitted), prior_sd and freed_sd (on the scale, as it is
+    and when freed on purpose), source.
+    """
+
+def fit(spectra: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], specular_included: bool = True, prior: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, threads: int = 0, progress: Callable | None = None) -> dict:
+    """
+    Skins whose reflectance is nearest to measured spectra (N, W), 0 to 1, under the priors.
+
+    wavelengths_nm: (W,) increasing within 380 to 780. specular_included: the spectra hold the surface's
+    reflection. prior: (F, 2) mean and standard deviation per row of fit_parameters(); 0 holds a value.
+    Returns a dict: value, standard_error, informed (share of the prior's variance that the data removed),
+    at_bound (1 or 0), all (N, F); correlation (N, F, F); reflectance (N, W), the fitted one; rmse, noise (per
+    expected noise), iterations, converged (1 or 0), all (N,).
+    progress(done, total) is called on this thread a few times a second; False raises Cancelled.
+    """
+
 class Cancelled(Exception):
     pass
 
@@ -60,13 +79,16 @@ def radial_profile(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, No
     R(r) [1/mm^2], (N, W, R), for Lambertian light on one point; its plane integral is reflectance().
     """
 
-def xyz(spectra: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+def xyz(spectra: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wavelengths_nm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], illuminant: str = 'D65') -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
     """
-    XYZ (N, 3) of reflectance spectra (N, W): D65, CIE 1931 2 degrees, Y = 100 for white.
+    XYZ (N, 3) of reflectance spectra (N, W): CIE 1931 2 degrees, illuminant 'D65' or 'A', Y = 100 for white.
     """
 
-def lab(xyz: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
-    """CIE L*a*b* (N, 3) of XYZ (Y = 100 for white) under D65."""
+def lab(xyz: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], illuminant: str = 'D65') -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+    """CIE L*a*b* (N, 3) of XYZ (Y = 100 for white) under 'D65' or 'A'."""
+
+def delta_e_2000(lab_1: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], lab_2: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+    """CIEDE2000 differences (N,) of two (N, 3) of L*a*b*."""
 
 def linear_rgb(xyz: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], working_space: str | Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)] = 'rec709') -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
     """

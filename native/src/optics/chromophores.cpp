@@ -55,6 +55,7 @@ Chromophores chromophores_at(double nm) {
     c.bilirubin = nm < bilirubin.back()[0] ? absorption_per_extinction * 1e-6 * lookup(bilirubin, nm)[0] : 0;
     // In 1/mm, twice the fit of Bashkatov et al. 2005 to whole skin; read as 1/cm it is ten times too small.
     c.epidermis_scattering = 14.74 * std::pow(nm, -0.22) + 2.2e11 * std::pow(nm, -4);
+    c.log_wavelength = std::log(nm / scatter_pivot_nm);
     return c;
 }
 

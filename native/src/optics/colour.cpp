@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <stdexcept>
 
@@ -41,10 +42,10 @@ Matrix3 columns(const Colour& a, const Colour& b, const Colour& c) {
     return {{{a[0], b[0], c[0]}, {a[1], b[1], c[1]}, {a[2], b[2], c[2]}}};
 }
 
-/// Weights of D65 and the observer at their own 5 nm, scaled to Y = 100.
-std::vector<Colour> weights_at_5_nm() {
+/// Weights of the illuminant and the observer at their own 5 nm, scaled to Y = 100.
+std::vector<Colour> weights_at_5_nm(Illuminant illuminant) {
     const auto observer = embedded_colour_matching();
-    const auto power = embedded_illuminant_d65();
+    const auto power = illuminant == Illuminant::a ? embedded_illuminant_a() : embedded_illuminant_d65();
     std::vector<Colour> weights(observer.size());
     double y = 0;
     for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -90,15 +91,15 @@ Matrix3 inverse(const Matrix3& m) {
     return cofactor;
 }
 
-Colour white_xyz() {
+Colour white_xyz(Illuminant illuminant) {
     Colour sum{};
-    for (const Colour& weight : weights_at_5_nm())
+    for (const Colour& weight : weights_at_5_nm(illuminant))
         for (int c = 0; c < 3; ++c)
             sum[c] += weight[c];
     return sum;
 }
 
-std::vector<Colour> xyz_weights(std::span<const double> nm) {
+std::vector<Colour> xyz_weights(std::span<const double> nm, Illuminant illuminant) {
     for (std::size_t i = 0; i < nm.size(); ++i)
         if (!(nm[i] >= min_wavelength_nm && nm[i] <= max_wavelength_nm) || (i > 0 && nm[i] <= nm[i - 1])) {
             std::ostringstream message;
@@ -110,7 +111,7 @@ std::vector<Colour> xyz_weights(std::span<const double> nm) {
         throw std::invalid_argument("wavelengths_nm: empty, needs one wavelength or more");
 
     const auto observer = embedded_colour_matching();
-    const std::vector<Colour> fine = weights_at_5_nm();
+    const std::vector<Colour> fine = weights_at_5_nm(illuminant);
     const std::ptrdiff_t count = std::ssize(nm), order = std::min<std::ptrdiff_t>(4, count);
     std::vector<Colour> weights(nm.size());
     for (std::size_t i = 0; i < fine.size(); ++i) {
@@ -129,11 +130,51 @@ std::vector<Colour> xyz_weights(std::span<const double> nm) {
     return weights;
 }
 
-Colour lab_from_xyz(const Colour& xyz) {
-    const Colour white = white_xyz();
+Colour lab_from_xyz(const Colour& xyz, Illuminant illuminant) {
+    const Colour white = white_xyz(illuminant);
     const auto f = [](double t) { return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116; };
     const double x = f(xyz[0] / white[0]), y = f(xyz[1] / white[1]), z = f(xyz[2] / white[2]);
     return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
+}
+
+double delta_e_2000(const Colour& lab_1, const Colour& lab_2) {
+    constexpr double degree = std::numbers::pi / 180;
+    const auto power7 = [](double x) { return std::pow(x, 7); };
+    const double pale = power7(25);
+    const double mean_chroma = (std::hypot(lab_1[1], lab_1[2]) + std::hypot(lab_2[1], lab_2[2])) / 2;  // Eq. 3
+    const double stretch = 1.5 - 0.5 * std::sqrt(power7(mean_chroma) / (power7(mean_chroma) + pale));  // 1 + G, Eq. 4
+    const double a1 = stretch * lab_1[1], a2 = stretch * lab_2[1], b1 = lab_1[2], b2 = lab_2[2];
+    const double c1 = std::hypot(a1, b1), c2 = std::hypot(a2, b2);
+    const auto hue = [](double a, double b) {  // 0 to 360 degrees, 0 for grey, Eq. 7
+        const double h = std::atan2(b, a) / degree;
+        return h < 0 ? h + 360 : h;
+    };
+    const double h1 = hue(a1, b1), h2 = hue(a2, b2);
+    const bool grey = c1 * c2 == 0;
+
+    double turn = grey ? 0 : h2 - h1;  // Eq. 10
+    if (turn > 180)
+        turn -= 360;
+    else if (turn < -180)
+        turn += 360;
+    const double lightness = lab_2[0] - lab_1[0], chroma = c2 - c1;
+    const double dh = 2 * std::sqrt(c1 * c2) * std::sin(turn / 2 * degree);
+
+    const double l = (lab_1[0] + lab_2[0]) / 2, c = (c1 + c2) / 2;
+    double h = h1 + h2;  // mean hue, Eq. 14
+    if (!grey) {
+        if (std::abs(h1 - h2) > 180)
+            h += h < 360 ? 360 : -360;
+        h /= 2;
+    }
+    const double t = 1 - 0.17 * std::cos((h - 30) * degree) + 0.24 * std::cos(2 * h * degree)
+                     + 0.32 * std::cos((3 * h + 6) * degree) - 0.20 * std::cos((4 * h - 63) * degree);  // Eq. 15
+    const double s_l = 1 + 0.015 * (l - 50) * (l - 50) / std::sqrt(20 + (l - 50) * (l - 50));           // Eq. 18
+    const double s_c = 1 + 0.045 * c, s_h = 1 + 0.015 * c * t;                                           // Eq. 19, 20
+    const double blue = 30 * std::exp(-std::pow((h - 275) / 25, 2));                                     // Eq. 16
+    const double r_t = -2 * std::sqrt(power7(c) / (power7(c) + pale)) * std::sin(2 * blue * degree);     // Eq. 17, 21
+    const double x = lightness / s_l, y = chroma / s_c, z = dh / s_h;
+    return std::sqrt(std::max(0.0, x * x + y * y + z * z + r_t * y * z));  // Eq. 22
 }
 
 Matrix3 rgb_from_xyz(std::string_view working_space) {

@@ -14,6 +14,7 @@ SpectralRows<3> embedded_hemoglobin();          ///< nm, molar extinction of HbO
 SpectralRows<2> embedded_bilirubin();           ///< nm, molar extinction [1/cm per mol/L]; 0 beyond
 SpectralRows<4> embedded_colour_matching();     ///< nm, x, y, z
 SpectralRows<2> embedded_illuminant_d65();      ///< nm, relative power
+SpectralRows<2> embedded_illuminant_a();        ///< nm, relative power
 std::span<const std::uint8_t> embedded_path_table_diffuse();
 std::span<const std::uint8_t> embedded_path_table_normal();
 
