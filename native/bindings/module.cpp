@@ -5,6 +5,7 @@
 
 namespace nb = nanobind;
 
+void bind_bench(nb::module_& m);
 void bind_fit(nb::module_& m);
 void bind_optics(nb::module_& m);
 void bind_solve(nb::module_& m);
@@ -16,6 +17,7 @@ NB_MODULE(_core, m) {
     bind_fit(m);
     bind_optics(m);
     bind_solve(m);
+    bind_bench(m);
     bind_texture(m);
     m.def(
         "counters",

@@ -7,9 +7,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "arrays.hpp"
 #include "counters.hpp"
-#include "sanguine/solver.hpp"
+#include "stacks.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -17,33 +16,10 @@ using namespace sanguine;
 
 namespace {
 
-using LayersIn = nb::ndarray<const double, nb::shape<-1, 5>, nb::c_contig, nb::device::cpu>;
-using RadiiIn = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-Incidence incidence_of(const std::string& name) {
-    if (name == "normal")
-        return Incidence::normal;
-    if (name == "diffuse")
-        return Incidence::diffuse;
-    throw std::invalid_argument("incidence: '" + name + "' is neither 'normal' nor 'diffuse'");
-}
-
-nb::object profile(std::vector<double> values) {
-    if (values.empty())
-        return nb::none();
-    const std::size_t count = values.size();
-    return nb::cast(to_numpy<1>(std::move(values), {count}));
-}
-
 nb::dict py_solve(const LayersIn& layers, const std::string& incidence, const std::optional<RadiiIn>& radii_mm,
                   const std::string& solver, double tolerance, double max_seconds, std::uint64_t max_photons,
                   std::uint64_t seed, int threads, const ProgressIn& progress) {
-    Problem problem;
-    problem.incidence = incidence_of(incidence);
-    for (std::size_t i = 0; i < layers.shape(0); ++i)
-        problem.layers.push_back({layers(i, 0), layers(i, 1), layers(i, 2), layers(i, 3), layers(i, 4)});
-    if (radii_mm)
-        problem.radii_mm.assign(radii_mm->data(), radii_mm->data() + radii_mm->size());
+    const Problem problem = problem_of(layers, incidence, radii_mm);
     const Solver& chosen = find_solver(solver);
     Solution s;
     {
@@ -58,8 +34,8 @@ nb::dict py_solve(const LayersIn& layers, const std::string& incidence, const st
     answer["R_unscattered"] = s.R_unscattered;
     answer["Tt"] = s.Tt;
     answer["specular"] = s.specular;
-    answer["R_per_mm2"] = profile(std::move(s.R_per_mm2));
-    answer["T_per_mm2"] = profile(std::move(s.T_per_mm2));
+    answer["R_per_mm2"] = profile_of(std::move(s.R_per_mm2));
+    answer["T_per_mm2"] = profile_of(std::move(s.T_per_mm2));
     answer["error_estimate"] = s.error_estimate;
     answer["elapsed_ms"] = s.elapsed_ms;
     answer["because"] = s.because;

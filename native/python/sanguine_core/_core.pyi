@@ -128,6 +128,17 @@ def solve(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order=
     called on this thread a few times a second; False raises Cancelled.
     """
 
+def adding_doubling(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order='C', device='cpu', writable=False)], incidence: str, streams: int) -> dict:
+    """
+    Totals of a stack (as in solve()) with a given number of directions per hemisphere, as a dict.
+    """
+
+def multipole(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order='C', device='cpu', writable=False)], radii_mm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, terms: int = -1) -> dict:
+    """
+    The classical multipole as it comes, without checks: a dict of R, T and R_per_mm2 per unit of light that
+    enters the stack. May be negative. terms: N for the dipoles -N to N of each layer, -1 for their closed sum.
+    """
+
 class ImageError(OSError):
     pass
 
