@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument("--solver", default="auto", metavar="NAME",
                        help="auto, skin, multipole, adding-doubling or monte-carlo (default %(default)s)")
     solve.add_argument("--tolerance", type=_share, default=0.01, metavar="X",
-                       help="relative error of the totals that is good enough (default %(default)s)")
+                       help="relative error that is good enough, of profiles twice that (default %(default)s)")
     solve.add_argument("--radii", metavar="MM,…", help="where the profile is wanted, for cases that do not say; "
                        "'none' for totals alone (default 40 radii from 0.011 to 18.2 mm)")
     solve.add_argument("--max-seconds", type=_positive, default=60.0, metavar="S",

@@ -70,7 +70,7 @@ void bind_solve(nb::module_& m) {
           "light on one point). radii_mm: (R,) ascending, where the profiles are wanted; without them totals alone.\n"
           "Returns a dict: Rd (left the top after scattering), R_unscattered (back from a deeper face without), Tt (all\n"
           "that left the bottom), specular (first surface), R_per_mm2 and T_per_mm2 (scattered light, (R,) or None),\n"
-          "error_estimate (relative; of profiles in the L1 norm), solver, because, warnings, elapsed_ms.\n"
+          "error_estimate (relative; of profiles half of the L1 norm), solver, because, warnings, elapsed_ms.\n"
           "Raises ValueError for what cannot be, SolverError where the solver has no answer. progress(done, total) is\n"
           "called on this thread a few times a second; False raises Cancelled.");
 }

@@ -66,6 +66,13 @@ def test_auto_profile_of_skin(automatic, name):
     assert np.sum(np.abs(found - table["value"]) * area) / np.sum(table["value"] * area) <= 0.04
 
 
+def test_the_skin_table_is_taken_where_it_holds(automatic):
+    """p04 and p07 have so much pigment that the table's profile is known to 2.3 and 2.7 % only: photons are traced."""
+    assert {name for name, r in automatic.items() if r["solver"] == "skin"} == {"p02", "p13"}
+    assert all("not the skin table" in r["because"] for r in automatic.values() if r["solver"] != "skin")
+    assert all(automatic[name]["error_estimate"] <= 0.01 for name in automatic)
+
+
 def test_totals_alone_trace_no_photon(cases):
     for result in ask(cases.values()):
         assert result["solver"] in ("skin", "adding-doubling")

@@ -22,7 +22,7 @@ struct Problem {
 
 /// How much may be spent on it.
 struct Effort {
-    double tolerance = 0.01;          ///< relative error of Rd that is good enough (of Tt, where there is a bottom)
+    double tolerance = 0.01;          ///< error_estimate that is good enough
     double max_seconds = 60;          ///< a solver that can stop early does, and says so in a warning
     std::uint64_t max_photons = 1u << 30;
     std::uint64_t seed = 1;
@@ -39,7 +39,8 @@ struct Solution {
     double specular = 0;       ///< reflected by the first surface
     std::vector<double> R_per_mm2;  ///< scattered light that leaves the top at each radius; empty if there is no profile
     std::vector<double> T_per_mm2;  ///< the same at the bottom; empty for a half-space
-    /// Expected relative error of Rd, Tt and (in the L1 norm) the profiles, whichever is largest.
+    /// Expected relative error of Rd and Tt, or half of that of the profiles in the L1 norm, whichever is largest: a
+    /// profile is an error spread over rings, of which a picture shows a blur.
     double error_estimate = 0;
     double elapsed_ms = 0;
     std::string because;  ///< of `auto`: why this solver

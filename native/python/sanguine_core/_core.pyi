@@ -123,7 +123,7 @@ def solve(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order=
     light on one point). radii_mm: (R,) ascending, where the profiles are wanted; without them totals alone.
     Returns a dict: Rd (left the top after scattering), R_unscattered (back from a deeper face without), Tt (all
     that left the bottom), specular (first surface), R_per_mm2 and T_per_mm2 (scattered light, (R,) or None),
-    error_estimate (relative; of profiles in the L1 norm), solver, because, warnings, elapsed_ms.
+    error_estimate (relative; of profiles half of the L1 norm), solver, because, warnings, elapsed_ms.
     Raises ValueError for what cannot be, SolverError where the solver has no answer. progress(done, total) is
     called on this thread a few times a second; False raises Cancelled.
     """

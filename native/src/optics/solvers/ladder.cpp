@@ -8,6 +8,7 @@
 #include "sanguine/adding_doubling.hpp"
 #include "sanguine/monte_carlo.hpp"
 #include "sanguine/multipole.hpp"
+#include "sanguine/skin_solver.hpp"
 #include "sanguine/solver.hpp"
 
 namespace sanguine {
@@ -17,8 +18,8 @@ std::string percent(double share) {
     return message(100 * share, " %");
 }
 
-/// Takes the cheapest rung whose known error is within the tolerance. By rising cost: adding-doubling
-/// (milliseconds; totals alone), Monte Carlo (seconds). The multipole is on no tolerance's list: its
+/// Takes the cheapest rung whose known error is within the tolerance. By rising cost: the skin table (microseconds),
+/// adding-doubling (milliseconds; totals alone), Monte Carlo (seconds). The multipole is on no tolerance's list: its
 /// profile is 13 to 200 % wrong on all but half-spaces of high albedo, and it cannot tell beforehand by how much.
 class Auto final : public Solver {
 public:
@@ -30,6 +31,18 @@ public:
 
     Solution solve(const Problem& problem, const Effort& effort) const override {
         std::string because;
+        const Solver& table = skin_solver();
+        if (const std::string reason = table.unsuited(problem); !reason.empty()) {
+            because = "not the skin table: " + reason;
+        } else {
+            Solution s = table.solve(problem, effort);
+            if (s.error_estimate <= effort.tolerance) {
+                s.because = "a skin that the table holds, known to " + percent(s.error_estimate);
+                return s;
+            }
+            because = "not the skin table: known to " + percent(s.error_estimate);
+        }
+
         // Plane-parallel totals are cheap and next to exact for any stack; they also scale the profile.
         const Problem totals_alone{problem.layers, problem.incidence, {}};
         Solution totals;
@@ -37,9 +50,9 @@ public:
         try {
             totals = adding_doubling_solver().solve(totals_alone, effort);
             have_totals = totals.error_estimate <= effort.tolerance;
-            because = "adding-doubling gives the totals to " + percent(totals.error_estimate);
+            because += "; adding-doubling gives the totals to " + percent(totals.error_estimate);
         } catch (const SolverError& error) {
-            because = std::string("no adding-doubling: ") + error.what();
+            because += std::string("; no adding-doubling: ") + error.what();
         }
         if (have_totals && problem.radii_mm.empty()) {
             totals.because = because;
@@ -116,7 +129,7 @@ void check_solution(const Solution& s) {
 }  // namespace
 
 std::span<const Solver* const> solvers() {
-    static const std::array<const Solver*, 4> all = {&multipole_solver(), &adding_doubling_solver(),
+    static const std::array<const Solver*, 5> all = {&skin_solver(), &multipole_solver(), &adding_doubling_solver(),
                                                      &monte_carlo_solver(), &automatic};
     return all;
 }

@@ -123,7 +123,9 @@ public:
         const RadialProfile profile(energy, p.unit_mm);
         for (const double radius : problem.radii_mm)
             out.R_per_mm2.push_back(profile.density(radius));
-        out.error_estimate += uncertainty.profile + shape_error + std::fabs(p.ratio_deviation);
+        const double profile_error =
+            out.error_estimate + uncertainty.profile + shape_error + std::fabs(p.ratio_deviation);
+        out.error_estimate = std::fmax(out.error_estimate, profile_error / 2);
         return out;
     }
 };
