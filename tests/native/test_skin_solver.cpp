@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "reference_cases.hpp"
+#include "sanguine/adding_doubling.hpp"
 
 namespace sanguine {
 namespace {
@@ -55,6 +56,49 @@ TEST(SkinSolver, ReferenceCases) {
                     100 * stated, 100 * difference / sum, 200 * s.error_estimate);
     }
     EXPECT_GE(solved, 4);
+}
+
+double exact(const Problem& problem) {
+    Effort effort;
+    effort.tolerance = 1e-4;
+    return adding_doubling_solver().solve(problem, effort).Rd;
+}
+
+TEST(SkinSolver, StatedErrorHoldsAgainstAddingDoubling) {
+    // Lengths in units of 1/mu_s'. Ordinary skin keeps the bar of 1 % as well; adding-doubling is good to 1e-4.
+    double worst = 0, worst_share = 0;
+    for (const Incidence incidence : {Incidence::normal, Incidence::diffuse})
+        for (const double tau : {0.01, 0.06, 0.25, 0.7, 2.0, 6.0, 14.0})
+            for (const double a1 : {0.0031, 0.05, 0.3, 1.5, 4.5, 11.0})
+                for (const double a2 : {0.0031, 0.02, 0.1, 0.8, 6.0}) {
+                    const Problem problem{{{a1, 5, 0.8, 1.4, tau}, {a2, 2.5, 0.8, 1.4, half_space}}, incidence, {}};
+                    const Solution s = skin_solver().solve(problem, {});
+                    const double error = std::fabs(s.Rd / exact(problem) - 1);
+                    EXPECT_LT(error, s.error_estimate + 1e-4) << tau << ' ' << a1 << ' ' << a2;
+                    worst_share = std::fmax(worst_share, error / s.error_estimate);
+                    if (a1 <= 1.5 && a2 <= 0.1) {
+                        EXPECT_LT(error, 0.01) << tau << ' ' << a1 << ' ' << a2;
+                        worst = std::fmax(worst, error);
+                    }
+                }
+    std::printf("ordinary skin: worst %.2f %%; worst error over stated error %.2f\n", 100 * worst, worst_share);
+}
+
+TEST(SkinSolver, ToleratedInputMovesTheTotalByLittle) {
+    // The factors in solvers/skin.cpp: 2.5 per unit of n, 1 per unit of g, mu_s' being kept.
+    const double skins[][4] = {{2.7, 6.28, 0.1, 0.6}, {48.6, 10.98, 0.06, 5.1}, {0.05, 6, 0.1, 0.04}, {14.8, 5.3, 0.1, 0.13}};
+    for (const Incidence incidence : {Incidence::normal, Incidence::diffuse})
+        for (const auto& [mu_a1, mu_s_prime, thickness, mu_a2] : skins) {
+            const auto solve = [&](double n, double g) {
+                return exact({{{mu_a1, mu_s_prime / (1 - g), g, n, thickness},
+                               {mu_a2, mu_s_prime / 2 / (1 - g), g, n, half_space}}, incidence, {}});
+            };
+            const double fixed = solve(1.4, 0.8);
+            for (const double sign : {-1.0, 1.0}) {
+                EXPECT_LT(std::fabs(solve(1.4 + sign * 1e-3, 0.8) / fixed - 1), 2.5 * 1e-3);
+                EXPECT_LT(std::fabs(solve(1.4, 0.8 + sign * 2e-3) / fixed - 1), 1 * 2e-3);
+            }
+        }
 }
 
 TEST(SkinSolver, TakesRoundedInput) {
