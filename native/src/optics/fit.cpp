@@ -36,7 +36,7 @@ constexpr FitParameter rows[] = {
     {"scatter_scale", &S::scatter_scale, FitScale::logarithm, 0.5, 2, 1.25, 0.15, 0.5, fitted,
      "spread of published skin, 4.2-6.7 per mm at 500 nm, Jacques 2013, Phys. Med. Biol. 58:R37"},
     {"scatter_power", &S::scatter_power, FitScale::linear, 0, 1.5, 0.55, 0.2, 0.6, fitted,
-     "published skin falls with a power of 0.9-1.6 of the wavelength, Donner and Jensen 2006 with 1.7"},
+     "measured faces; published fits of mu_s' fall over 400-700 nm with a power of 1.0-3.0, Donner and Jensen's with 1.9"},
     {"vessel_radius_mm", &S::vessel_radius_mm, FitScale::root, 0, 0.05, 0.008, 0.02, 0.05, fitted,
      "capillaries 0.003-0.005 mm, venules of the upper plexus to 0.02"},
     {"bilirubin_umol_per_l", &S::bilirubin_umol_per_l, FitScale::root, 0, 200, 8, 0.9, 0.9, 0,
