@@ -305,7 +305,7 @@ typedef float Block __attribute__((vector_size(64), aligned(4), may_alias));
 /// (1 - exp(-y)) / y, the mean of exp(-x) over 0 <= x <= y, given exp(-y); by its series where the quotient cancels.
 SANGUINE_INLINE float mean_attenuation(float y, float exp_y) {
     const float series = 1 - y * (1.0f / 2 - y * (1.0f / 6 - y * (1.0f / 24 - y * (1.0f / 120 - y * (1.0f / 720
-                       - y * (1.0f / 5040 - y * (1.0f / 40320)))))));
+                       - y * (1.0f / 5040))))));
     const float quotient = (1 - exp_y) / (y > 0.5f ? y : 1);
     return y > 0.5f ? quotient : series;
 }
@@ -526,7 +526,7 @@ PathTable::Uncertainty PathTable::uncertainty(double tau, double a1, double a2) 
     double noise = 0, spread = 0, ring_noise = 0;
     alignas(64) std::array<Weights, 2> plain, squared, two_points;
     alignas(64) Weights sums;
-    std::vector<float> rows;
+    AlignedFloats rows;
     alignas(64) std::array<float, padded_rings> variance;
     for (int k = 0; k < 4; ++k) {
         const Node& node = nodes_[stencil.first + k];
