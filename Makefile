@@ -31,7 +31,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test docs native setup openimageio stub extension matrix clean system
+.PHONY: help demo test soak docs native setup openimageio stub extension matrix clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -43,7 +43,13 @@ test: setup $(TEST_STAMP) ## Install what is needed and run every test
 	cmake --preset default
 	cmake --build --preset default
 	ctest --preset default
+	cmake --preset sanitize
+	cmake --build --preset sanitize
+	ctest --preset sanitize --parallel $(shell nproc)
 	$(PY) -m pytest tests
+
+soak: setup $(TEST_STAMP) ## Look for stacks and skins that break the optics, for an hour or so
+	$(PY) -m pytest tests/stability --soak
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
 

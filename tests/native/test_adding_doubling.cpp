@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "effort.hpp"
 #include "reference_cases.hpp"
 #include "sanguine/unscattered.hpp"
 
@@ -162,7 +163,7 @@ TEST(AddingDoubling, SplittingALayerChangesNothing) {
 TEST(AddingDoubling, TheReversedStackTransmitsTheSame) {
     std::mt19937_64 random(11);
     std::uniform_real_distribution<double> n(1, 3), g(-0.9, 0.95), power(-3, 2), length(-3, 0);
-    for (int trial = 0; trial < 60; ++trial) {
+    for (std::size_t trial = 0; trial < 60; trial += sweep_stride) {
         Stack stack(1 + trial % 8);
         for (Layer& layer : stack)
             layer = {std::pow(10, power(random) - 2), std::pow(10, power(random)), g(random), n(random),

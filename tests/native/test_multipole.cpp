@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "effort.hpp"
 #include "reference_cases.hpp"
 #include "sanguine/hankel.hpp"
 
@@ -366,7 +367,7 @@ TEST(Multipole, ExtremesAnswerOrRefuse) {
                                    .radii_mm = {1e-4, 0.1, 50}});
     std::mt19937 random(5);
     const auto pick = [&](const auto& values) { return values[random() % std::size(values)]; };
-    for (int i = 0; i < 2500; ++i) {
+    for (std::size_t i = 0; i < 2500; i += sweep_stride) {
         Problem problem{.layers = {}, .radii_mm = {1e-4, 0.01, 1, 50}};
         const std::size_t count = 1 + random() % max_layers;
         for (std::size_t k = 0; k < count; ++k)

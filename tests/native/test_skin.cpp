@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "effort.hpp"
 #include "sanguine/burley.hpp"
 #include "sanguine/fresnel.hpp"
 
@@ -139,8 +140,12 @@ TEST(Burley, RecoversLobes) {
 }
 
 TEST(Burley, KeepsEnergyAndSign) {
+    const std::vector<SkinParameters> all = extremes();
+    std::vector<SkinParameters> skins;
+    for (std::size_t i = 0; i < all.size(); i += sweep_stride)
+        skins.push_back(all[i]);
     for (const char* space : {"rec709", "acescg"})
-        for (const SkinLobes& skin : skin_lobes(extremes(), rgb_from_xyz(space), 4, 0, {}))
+        for (const SkinLobes& skin : skin_lobes(skins, rgb_from_xyz(space), 4, 0, {}))
             for (int c = 0; c < 3; ++c) {
                 const BurleyFit& fit = skin.channel[c];
                 double sum = 0;

@@ -1,7 +1,8 @@
 """Options of the stability suite, and the page it writes about itself.
 
     pytest tests/stability                               quick and repeatable: part of `make test`
-    pytest tests/stability --soak                        many more examples, new ones every time, finer grids
+    pytest tests/stability --soak                        fifty times as many examples, new ones every time; finer grids
+    pytest tests/stability --soak=5                      five times as many
     pytest tests/stability --report docs/stability.md    writes the page from what the run saw
 """
 
@@ -18,13 +19,14 @@ HERE = Path(__file__).parent
 
 def pytest_addoption(parser):
     group = parser.getgroup("stability")
-    group.addoption("--soak", action="store_true", default=False, help="thousands of random examples, finer grids")
+    group.addoption("--soak", metavar="FACTOR", nargs="?", type=int, const=50, default=0,
+                    help="new random examples, FACTOR times as many (50), and finer grids")
     group.addoption("--report", metavar="FILE", default=None, help="write docs/stability.md anew")
 
 
 def pytest_configure(config):
     # `pytest tests` meets this file too late for its options to exist: then it is the quick run.
-    extremes.SOAK = config.getoption("--soak", default=False)
+    extremes.SOAK = config.getoption("--soak", default=0)
 
 
 @pytest.fixture(scope="session")

@@ -90,6 +90,24 @@ def test_any_skin_as_a_stack(solver, stack, incidence):
     ask(stack, solver, incidence, RADII, max_photons=1024)
 
 
+@pytest.mark.parametrize("incidence", INCIDENCES)
+def test_the_skin_table_knows_its_error(incidence):
+    """On a grid over all that the table holds, and beyond (mu_s' d from 1e-4 to 20, mu_a / mu_s' of both layers from
+    1e-3 to 100): wherever it answers, adding-doubling lies within the error that it states, and 1e-4."""
+    count = extremes.finer(5)
+    answers = 0
+    for tau in np.geomspace(1e-4, 20, 2 * count):
+        for a1 in np.geomspace(1e-3, 100, 2 * count):
+            for a2 in np.geomspace(1e-3, 100, count):
+                stack = [(10 * a1, 50.0, 0.8, 1.4, tau / 10), (5 * a2, 25.0, 0.8, 1.4, math.inf)]
+                table = ask(stack, "skin", incidence)
+                if table:
+                    answers += 1
+                    exact = ask(stack, "adding-doubling", incidence)
+                    assert same_within(table["Rd"], exact["Rd"], table.error + 1e-4), (stack, table.answer, exact.answer)
+    assert answers > count**3
+
+
 # --- what cannot be
 
 
