@@ -262,7 +262,7 @@ void bind_optics(nb::module_& m) {
           "Share of Lambertian light that the surface reflects, (N, 2): oil film alone, film and skin together.\n\n"
           "Under the film the skin's reflectance is (1 - film) * reflectance().");
     m.def("default_radii_mm", &py_default_radii_mm,
-          "Logarithmic radii from 0.0005 to 40 mm for radial_profile().\n\n"
+          "Logarithmic radii from 0.0003 to 40 mm for radial_profile().\n\n"
           "The disk inside the first one holds 2 pi r^2 R(r): there every profile falls as 1/r.");
     m.def("radial_profile", &py_radial_profile, "skins"_a, "wavelengths_nm"_a, "radius_mm"_a, "threads"_a = 0,
           "progress"_a = nb::none(),

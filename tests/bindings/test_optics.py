@@ -46,7 +46,7 @@ def test_profile_integrates_to_reflectance_on_its_default_radii():
     rows = skins({}, {"melanin": 0.2}, {"epidermis_thickness_mm": 0.02, "hemoglobin": 0.05})
     nm = np.array([420.0, 550.0, 650.0])
     radii = core.default_radii_mm()
-    assert radii[0] == pytest.approx(0.0005) and radii[-1] == pytest.approx(40)
+    assert radii[0] == pytest.approx(0.0003) and radii[-1] == pytest.approx(40)
     profile = core.radial_profile(rows, nm, radii)
     assert profile.shape == (3, 3, len(radii)) and (profile >= 0).all()
     energy = 2 * np.pi * radii**2 * profile

@@ -24,7 +24,7 @@ using ProfileVisitor = std::function<void(std::size_t skin, std::size_t waveleng
 void solve_profiles(std::span<const SkinParameters> skins, std::span<const double> wavelengths_nm, int threads,
                     const Progress& progress, const ProfileVisitor& visit);
 
-/// Radii to sample a profile at: logarithmic, 0.0005 to 40 mm. The first lies where every profile falls as 1/r: the
+/// Radii to sample a profile at: logarithmic, 0.0003 to 40 mm. The first lies where every profile falls as 1/r: the
 /// disk inside it holds 2 pi r^2 R(r).
 std::vector<double> default_radii_mm();
 

@@ -69,7 +69,7 @@ def surface(skins: Annotated[NDArray[numpy.float64], dict(shape=(None, None), or
 
 def default_radii_mm() -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
     """
-    Logarithmic radii from 0.0005 to 40 mm for radial_profile().
+    Logarithmic radii from 0.0003 to 40 mm for radial_profile().
 
     The disk inside the first one holds 2 pi r^2 R(r): there every profile falls as 1/r.
     """

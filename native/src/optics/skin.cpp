@@ -107,8 +107,8 @@ void solve_profiles(std::span<const SkinParameters> skins, std::span<const doubl
 }
 
 std::vector<double> default_radii_mm() {
-    constexpr int count = 114;  // a tenth apart
-    constexpr double first = 0.0005, last = 40;
+    constexpr int count = 119;  // a tenth apart
+    constexpr double first = 0.0003, last = 40;
     std::vector<double> radii;
     for (int k = 0; k < count; ++k)
         radii.push_back(first * std::pow(last / first, k / (count - 1.0)));
@@ -118,10 +118,11 @@ std::vector<double> default_radii_mm() {
 constexpr std::size_t max_rgb_rings = 80;
 
 std::span<const double> rgb_ring_edges_mm() {
-    // 0.0005 mm, well inside the first ring of every wavelength, to 60 mm, outside the last of the reddest.
+    // 0.0003 mm, inside the first ring of every wavelength (0.00034 mm at 380 nm and scatter_scale 2), to 60 mm, outside
+    // the last of the reddest but for scatter_scale below 1.
     static const std::vector<double> edges = [] {
         std::vector<double> out;
-        for (double r = 0.0005; r < 60; r *= path_grid::radius_ratio)
+        for (double r = 0.0003; r < 60; r *= path_grid::radius_ratio)
             out.push_back(r);
         if (out.size() > max_rgb_rings)
             throw std::logic_error("rgb_ring_edges_mm: more than max_rgb_rings");
