@@ -36,7 +36,8 @@ struct OpticalCoefficients {
 };
 
 /// Absorption of blood [1/mm] as a beam of diffuse light meets it when it is gathered in vessels of `radius_mm`, per
-/// volume of blood: mu_a times (1 - exp(-2 mu_a r)) / (2 mu_a r), Svaasand et al. 1995, van Veen et al. 2002, Opt. Lett. 27:246.
+/// volume of blood: mu_a times (1 - exp(-2 mu_a r)) / (2 mu_a r), Svaasand et al. 1995, van Veen et al. 2002, Opt.
+/// Lett. 27:246.
 /// Needs mu_a, radius > 0.
 template <class Expm1> double packaged_absorption(double mu_a, double radius_mm, const Expm1& expm1) {
     return -expm1(-2 * mu_a * radius_mm) / (2 * radius_mm);

@@ -36,7 +36,8 @@ constexpr FitParameter rows[] = {
     {"scatter_scale", &S::scatter_scale, FitScale::logarithm, 0.5, 2, 1.25, 0.15, 0.5, fitted,
      "spread of published skin, 4.2-6.7 per mm at 500 nm, Jacques 2013, Phys. Med. Biol. 58:R37"},
     {"scatter_power", &S::scatter_power, FitScale::linear, 0, 1.5, 0.55, 0.2, 0.6, fitted,
-     "measured faces; published fits of mu_s' fall over 400-700 nm with a power of 1.0-3.0, Donner and Jensen's with 1.9"},
+     "measured faces; published fits of mu_s' fall over 400-700 nm with a power of 1.0-3.0, Donner and Jensen's "
+     "with 1.9"},
     {"vessel_radius_mm", &S::vessel_radius_mm, FitScale::root, 0, 0.05, 0.008, 0.02, 0.05, fitted,
      "capillaries 0.003-0.005 mm, venules of the upper plexus to 0.02"},
     {"bilirubin_umol_per_l", &S::bilirubin_umol_per_l, FitScale::root, 0, 200, 8, 0.9, 0.9, 0,
@@ -137,7 +138,8 @@ double model(const Problem& p, const Values& x, const SkinParameters& skin, cons
             if (rows[i].field == field)
                 g[i] = passes * value;
     };
-    set(&S::melanin, r.by_a1 * (std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend) - pure.baseline) / mu_s);
+    const double melanin = std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend);
+    set(&S::melanin, r.by_a1 * (melanin - pure.baseline) / mu_s);
     set(&S::melanin_blend, r.by_a1 * skin.melanin * (pure.eumelanin - pure.pheomelanin) / mu_s);
     set(&S::hemoglobin, r.by_a2 * (f - pure.baseline) / mu_s);
     set(&S::oxygenation, r.by_a2 * skin.hemoglobin * transmitted * (pure.oxyhemoglobin - pure.deoxyhemoglobin) / mu_s);
@@ -190,7 +192,8 @@ private:
     Values natural(const Values& u) const {
         Values x;
         for (std::size_t i = 0; i < count; ++i)
-            x[i] = p_.sd[i] > 0 ? std::clamp(from_scale(rows[i].scale, u[i]), rows[i].lower, rows[i].upper) : p_.value[i];
+            x[i] = p_.sd[i] > 0 ? std::clamp(from_scale(rows[i].scale, u[i]), rows[i].lower, rows[i].upper)
+                                : p_.value[i];
         return x;
     }
 
@@ -338,7 +341,8 @@ private:
             // A thousandth of the way: a root approaches 0 ever more slowly.
             out.at_bound[i] = std::min(u_[i] - p_.low[i], p_.high[i] - u_[i]) < 1e-3 * width;
             for (std::size_t b = 0; b < free(); ++b)
-                out.correlation[i * count + p_.free[b]] = covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
+                out.correlation[i * count + p_.free[b]] =
+                    covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
         }
         out.reflectance = fitted_;
         double sum = 0;
@@ -376,7 +380,8 @@ Problem problem_from(std::span<const double> wavelengths_nm, const FitOptions& o
     for (std::size_t w = 0; w < wavelengths_nm.size(); ++w) {
         p.pure.push_back(chromophores_at(wavelengths_nm[w]));
         if (w > 0 && !(wavelengths_nm[w] > wavelengths_nm[w - 1]))
-            throw refusal("wavelengths_nm: ", wavelengths_nm[w], " after ", wavelengths_nm[w - 1], " does not increase");
+            throw refusal("wavelengths_nm: ", wavelengths_nm[w], " after ", wavelengths_nm[w - 1],
+                          " does not increase");
     }
     if (wavelengths_nm.size() < min_fit_wavelengths)
         throw refusal("wavelengths_nm: ", wavelengths_nm.size(), " are too few, a fit needs ", min_fit_wavelengths);

@@ -118,8 +118,8 @@ std::vector<double> default_radii_mm() {
 constexpr std::size_t max_rgb_rings = 80;
 
 std::span<const double> rgb_ring_edges_mm() {
-    // 0.0003 mm, inside the first ring of every wavelength (0.00034 mm at 380 nm and scatter_scale 2), to 60 mm, outside
-    // the last of the reddest but for scatter_scale below 1.
+    // 0.0003 mm, inside the first ring of every wavelength (0.00034 mm at 380 nm and scatter_scale 2), to 60 mm,
+    // outside the last of the reddest but for scatter_scale below 1.
     static const std::vector<double> edges = [] {
         std::vector<double> out;
         for (double r = 0.0003; r < 60; r *= path_grid::radius_ratio)
