@@ -52,7 +52,7 @@ def main() -> None:
     subject = shot.subjects[0]
     options.out.mkdir(parents=True, exist_ok=True)
     renderer = BlenderRenderer()
-    plan = make_plan(scene_of(shot, subject, renderer.regions(subject)))
+    plan = make_plan(scene_of(shot, subject, renderer.regions(subject)), shot.chosen_quality.settings)
     pictures, seconds = {}, {}
     for kind in ("sanguine", "principled"):
         renderer.prepare(shot, subject, plan)

@@ -16,6 +16,7 @@ from ..domain.errors import InputError
 from ..domain.files import atomic, read_json, write_json
 from ..domain.parameters import skin_from
 from ..domain.plan import Plan, make_plan
+from ..domain.quality import Choice, Settings
 from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
 
 MANIFEST = "manifest.json"
@@ -46,13 +47,16 @@ def render_batch(
     only: list[str] | None = None,
     resume: bool = False,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    quality: Choice | None = None,
 ) -> dict[str, Any]:
     """Renders `shot` into the folder `out` and returns the manifest.
 
     Each image and the manifest are written whole or not at all, so a run can be killed at any moment; with
     `resume` an image is kept when its parameters and its checksum still agree with the manifest.
+    `quality` stands in the place of the shot's own.
     The plan is that of the whole shot even with `only`: one frame alone equals the same frame in sequence.
     """
+    settings = (quality or shot.chosen_quality).settings
     folder = Path(out)
     wanted = [job for job in jobs(shot) if only is None or job.id in only]
     whole = _finished(folder) if resume or only is not None else {}
@@ -64,10 +68,10 @@ def render_batch(
     done = 0
     for subject in shot.subjects:
         mine = [job for job in wanted if job.subject == subject.id]
-        plan = make_plan(scene_of(shot, subject, renderer.regions(subject)))
+        plan = make_plan(scene_of(shot, subject, renderer.regions(subject)), settings)
         missing = []
         for job in mine:
-            prints = _fingerprint(shot, subject, job)
+            prints = _fingerprint(shot, subject, job, settings)
             if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in _SUFFIXES):
                 done += 1
             else:
@@ -98,7 +102,7 @@ def _render(
         "subject": subject.id,
         "expression": job.expression,
         "frame": job.frame,
-        "parameters": _parameters(shot, subject, job),
+        "parameters": _parameters(shot, subject, job, plan.settings),
         "effects": [e.id for e in plan.active if job.id in plan.decisions[e.id].frames],
         "seconds": round(time.perf_counter() - start, 3),
         "fingerprint": fingerprint,
@@ -106,7 +110,7 @@ def _render(
     return {job.id + suffix: {"file": job.id + suffix, "sha256": sums[suffix], **row} for suffix in _SUFFIXES}
 
 
-def _parameters(shot: Shot, subject: Subject, job: Job) -> dict[str, Any]:
+def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings) -> dict[str, Any]:
     return {
         "head": subject.rig.head,
         "skin": skin_from(subject.skin, "skin"),
@@ -114,14 +118,15 @@ def _parameters(shot: Shot, subject: Subject, job: Job) -> dict[str, Any]:
         "pose": pose_of(shot, job).model_dump(exclude={"id", "frame"}),
         "light": shot.light.model_dump(),
         "camera": shot.camera.model_dump(),
-        "image": shot.image.model_dump(),
+        "image": shot.image.model_dump(exclude={"samples"}),
+        "quality": settings.model_dump(),
     }
 
 
-def _fingerprint(shot: Shot, subject: Subject, job: Job) -> str:
+def _fingerprint(shot: Shot, subject: Subject, job: Job, settings: Settings) -> str:
     """Changes with anything that changes the image. The whole shot's plan is in it by its poses."""
     poses = [pose_of(shot, other).model_dump(exclude={"id", "frame"}) for other in jobs(shot) if other.subject == subject.id]
-    what = [sanguine_core.__version__, _parameters(shot, subject, job), poses]
+    what = [sanguine_core.__version__, _parameters(shot, subject, job, settings), poses]
     return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
 
 

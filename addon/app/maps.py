@@ -12,8 +12,6 @@ from ..domain.blood import ANATOMY, Rest
 from ..domain.effects import anatomy
 from ..domain.effects.regions import region_images
 
-# About 0.8 mm per texel on the example head: finer than any region is soft, the border of the lips just so.
-DEFAULT_SIZE = 1024
 # Texels that repeat a UV island's edge outward, so that filtering never meets the background.
 _PADDING = 16
 
@@ -32,7 +30,7 @@ class Surface:
     regions: Mapping[str, np.ndarray]
 
 
-def bake_maps(wanted: tuple[str, ...], surface: Surface, size: int = DEFAULT_SIZE) -> dict[str, np.ndarray]:
+def bake_maps(wanted: tuple[str, ...], surface: Surface, size: int) -> dict[str, np.ndarray]:
     """The maps of a plan. Returns map id -> (size, size, 3 or 4) float32, row 0 lowest; nothing unasked for."""
     if not wanted:
         return {}

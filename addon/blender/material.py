@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..domain.effects import EFFECTS, ShaderInput
-from ..domain.lut import QUANTITIES, Table, bake
+from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shader import Shader, assemble, lobe_sockets
@@ -32,7 +32,7 @@ def build_skin_material(
     name: str, plan: Plan, maps: Mapping[str, np.ndarray], progress: Callable[[int, int], bool] | None = None
 ) -> bpy.types.Material:
     """A new material for `plan`. maps: map id -> (H, W, 3 or 4) float32, row 0 lowest, for each of `plan.maps`."""
-    table = bake(plan.axes, plan.scene.skin, working_space(), progress)
+    table = bake(plan.axes, plan.scene.skin, working_space(), progress, plan.settings.lobes)
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # since Blender 5.0 there always is one
         material.use_nodes = True
@@ -75,7 +75,7 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) 
     if table.axes:
         build.read_table(table, points, lobes)
     else:
-        for socket, value in zip(lobe_sockets(), table.image.reshape(QUANTITIES, 3), strict=True):
+        for socket, value in zip(lobe_sockets(table.lobes), table.image.reshape(-1, 3), strict=True):
             lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
     if "relief" in shaders:
         bump = build.node("ShaderNodeBump")
@@ -178,7 +178,7 @@ class _Builder:
         image = data_image(f"{self.name} table", table.image)
         slices = {"": "table_low"} if len(table.axes) < 3 else {"": "table_low", "_high": "table_high"}
         for suffix, coordinates in slices.items():
-            for quantity, socket in enumerate(lobe_sockets(suffix)):
+            for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix)):
                 shift = self.node("ShaderNodeVectorMath")
                 shift.operation = "ADD"
                 shift.inputs[1].default_value = (0.0, table.quantity_offset(quantity), 0.0)

@@ -8,7 +8,7 @@ from ..domain.effects import Frame, Scene
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
-from .properties import skin_of, strengths_of
+from .properties import quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions
 
@@ -36,7 +36,8 @@ def live_plan(face: bpy.types.Object) -> Plan:
             strengths=strengths_of(face),
             regions=face_regions(face),
             live=True,
-        )
+        ),
+        quality_of(face),
     )
 
 

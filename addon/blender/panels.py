@@ -8,6 +8,7 @@ from ..domain.blood import BLOOD_CONTROL
 from ..domain.effects import EFFECTS
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
+from ..domain.quality import preset
 from .operators import SANGUINE_OT_apply_skin, active_face, emotion_bone, live_plan
 from .properties import strength_property
 
@@ -51,6 +52,8 @@ class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         settings = active_face(context).sanguine
+        layout.prop(settings, "quality")
+        layout.label(text=preset(settings.quality).measured)
         for row in PARAMETERS.values():
             layout.prop(settings, row.id)
         for effect in EFFECTS:

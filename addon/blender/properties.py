@@ -1,4 +1,4 @@
-"""`Object.sanguine`: the skin of a face, one Blender property per row of the schema and per effect strength."""
+"""`Object.sanguine`: the skin of a face, one Blender property per row of the schema and per effect strength, and its quality."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import bpy
 
 from ..domain.effects import EFFECTS
 from ..domain.parameters import PARAMETERS
+from ..domain.quality import DEFAULT, PRESETS, Settings, preset
 
 
 def _skin_properties() -> dict[str, object]:
@@ -30,7 +31,19 @@ def _skin_properties() -> dict[str, object]:
                 name=effect.label, description=effect.help, default=effect.default_strength, min=0.0, max=1.0,
                 override={"LIBRARY_OVERRIDABLE"},
             )
+    made["quality"] = bpy.props.EnumProperty(
+        name="Quality",
+        description="How finely the skin is simulated: samples change at once, the rest when the skin is applied",
+        items=[(name, name.capitalize(), f"{point.measured} (one core)") for name, point in PRESETS.items()],
+        default=DEFAULT,
+        update=_set_samples,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     return made
+
+
+def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    context.scene.cycles.samples = preset(settings.quality).samples
 
 
 def strength_property(effect_id: str) -> str:
@@ -65,3 +78,7 @@ def strengths_of(obj: bpy.types.Object) -> dict[str, float]:
         for effect in EFFECTS
         if effect.default_strength is not None
     }
+
+
+def quality_of(obj: bpy.types.Object) -> Settings:
+    return preset(obj.sanguine.quality).settings

@@ -46,7 +46,7 @@ class BlenderRenderer:
                 turn_deg=shot.camera.yaw_degrees,
                 lights=tuple(replace(light, power=light.power * shot.light.strength) for light in LIGHTS),
             )
-            set_image(scene, shot.image)
+            set_image(scene, shot.image, plan.settings.samples)
             apply_skin(face.skin, face.rig, plan)
         self._rig = face.rig
 
@@ -62,14 +62,14 @@ class BlenderRenderer:
             save_render(scene, exr, "OPEN_EXR")
 
 
-def set_image(scene: bpy.types.Scene, image: Image) -> None:
+def set_image(scene: bpy.types.Scene, image: Image, samples: int) -> None:
     """Size, samples and view of a shot. Raises InputError for a view transform that this Blender has not."""
     render, cycles = scene.render, scene.cycles
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y, render.resolution_percentage = image.width, image.height, 100
     cycles.device = "CPU"
     cycles.shading_system = True  # OSL
-    cycles.samples = image.samples
+    cycles.samples = samples
     cycles.seed = image.seed
     cycles.use_denoising = image.denoise
     # Fixed samples: the same frame is the same picture on every machine of a farm.

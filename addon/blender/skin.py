@@ -22,7 +22,7 @@ def apply_skin(
     progress: Callable[[int, int], bool] | None = None,
 ) -> bpy.types.Material:
     """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`."""
-    maps = bake_maps(plan.maps, read_surface(face)) if plan.maps else {}
+    maps = bake_maps(plan.maps, read_surface(face), plan.settings.map_size) if plan.maps else {}
     before = face.material_slots[slot].material if face.material_slots else None
     if before is not None and MARK in before and before.users == 1:
         remove_skin_material(before)

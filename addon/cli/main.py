@@ -73,14 +73,24 @@ def _parser() -> argparse.ArgumentParser:
 
     plan = _verb(verbs, "plan", _plan, "what a shot will simulate, and why, without doing it")
     plan.add_argument("shot", metavar="SHOT.toml")
+    _quality_flags(plan)
     plan.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
     render = _verb(verbs, "render", _render, "render a shot: one image per subject, expression and frame")
     render.add_argument("shot", metavar="SHOT.toml")
     render.add_argument("--out", required=True, metavar="DIR", help="folder for the images and manifest.json")
+    _quality_flags(render)
     render.add_argument("--only", metavar="ID,…", help="only these images")
     render.add_argument("--resume", action="store_true", help="keep what an earlier run of the same shot finished")
     return parser
+
+
+def _quality_flags(verb: argparse.ArgumentParser) -> None:
+    flags = verb.add_mutually_exclusive_group()
+    flags.add_argument("--quality", metavar="NAME",
+                       help="draft, preview, final or reference, in place of the shot's quality and samples")
+    flags.add_argument("--delta-e", type=float, metavar="X",
+                       help="the cheapest measured setting whose error is at most X (Delta E 2000)")
 
 
 def _verb(verbs: Any, name: str, run: Any, help: str) -> argparse.ArgumentParser:
@@ -143,19 +153,23 @@ def _fit(options: argparse.Namespace) -> int:
 def _plan(options: argparse.Namespace) -> int:
     from ..app.planning import plan_report
     from ..domain.effects.regions import FACE_REGIONS
+    from ..domain.quality import choice
     from ..domain.shot import read_shot
 
-    _answer(plan_report(read_shot(options.shot), FACE_REGIONS), options.out)
+    quality = choice(options.quality, options.delta_e)
+    _answer(plan_report(read_shot(options.shot), FACE_REGIONS, quality), options.out)
     return 0
 
 
 def _render(options: argparse.Namespace) -> int:
     from ..app.batch import render_batch
     from ..domain.files import check_folder
+    from ..domain.quality import choice
     from ..domain.shot import jobs, read_shot
     from .progress import reporter
 
     shot = read_shot(options.shot)
+    quality = choice(options.quality, options.delta_e)
     check_folder(options.out)  # before Blender is loaded, which takes a second and may talk
     only = None
     if options.only is not None:
@@ -174,7 +188,7 @@ def _render(options: argparse.Namespace) -> int:
         raise InputError("render: no Blender module: run this inside Blender, or `pip install bpy==4.5.15`") from None
     with reporter(options.json_progress) as progress:
         render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
-                     progress=progress)
+                     progress=progress, quality=quality)
     return 0
 
 

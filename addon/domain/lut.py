@@ -1,6 +1,6 @@
 """The table of scattering: Burley lobes over the chromophores that vary, as one image.
 
-Layout, from the first row up: for each quantity (weight 0..3, then d_mm 0..3) one block; a block holds one tile
+Layout, from the first row up: for each quantity (weight of each lobe, then d_mm of each) one block; a block holds one tile
 per entry of axis 2; a tile has one row per entry of axis 1 and one column per entry of axis 0.
 """
 
@@ -17,6 +17,7 @@ from .parameters import PARAMETERS, Skin, skin_rows
 from .plan import Axis
 
 LOBES = 4
+"""The most that a profile is fitted with; `quality.Settings.lobes` may ask for fewer."""
 QUANTITIES = 2 * LOBES
 
 
@@ -29,17 +30,18 @@ class Table:
     """
 
     axes: tuple[Axis, ...]
+    lobes: int
     image: np.ndarray
     clamped: np.ndarray
     fit_error: np.ndarray
 
     def quantity_offset(self, quantity: int) -> float:
         """How far up the image (0-1) the block of `quantity` begins."""
-        return quantity / QUANTITIES
+        return quantity / (2 * self.lobes)
 
 
-def table_height(axes: tuple[Axis, ...]) -> int:
-    return QUANTITIES * math.prod(axis.count for axis in axes[1:])
+def table_height(axes: tuple[Axis, ...], lobes: int = LOBES) -> int:
+    return 2 * lobes * math.prod(axis.count for axis in axes[1:])
 
 
 def entry_skins(axes: tuple[Axis, ...], skin: Skin) -> np.ndarray:
@@ -57,12 +59,14 @@ def bake(
     skin: Skin,
     working_space: str | np.ndarray,
     progress: Callable[[int, int], bool] | None = None,
+    lobes: int = LOBES,
 ) -> Table:
     """Solves every entry. `working_space`: a name that `sanguine_core` knows or a 3x3 XYZ (D65) to RGB matrix."""
     fit = sanguine_core.burley_lobes(
-        entry_skins(axes, skin), working_space, lobe_count=LOBES, threads=0, progress=progress
+        entry_skins(axes, skin), working_space, lobe_count=lobes, threads=0, progress=progress
     )
     columns = axes[0].count if axes else 1
-    quantities = np.concatenate([fit["weights"], fit["d_mm"]], axis=1)  # (N, QUANTITIES, 3)
-    image = quantities.transpose(1, 0, 2).reshape(table_height(axes), columns, 3)
-    return Table(axes, np.ascontiguousarray(image, dtype=np.float32), fit["clamped"].max(0), fit["fit_error"].max(0))
+    quantities = np.concatenate([fit["weights"], fit["d_mm"]], axis=1)  # (N, 2 * lobes, 3)
+    image = quantities.transpose(1, 0, 2).reshape(table_height(axes, lobes), columns, 3)
+    image = np.ascontiguousarray(image, dtype=np.float32)
+    return Table(axes, lobes, image, fit["clamped"].max(0), fit["fit_error"].max(0))

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, scattering
 from .errors import InputError, nearest
 from .parameters import PARAMETERS
+from .quality import DEFAULT, Settings, preset
 
 AXIS_CHROMOPHORES = ("hemoglobin", "melanin", "oxygenation")
 """Chromophores that the table can vary over, fastest axis first."""
 
 # Colour goes with the logarithm of an absorber's concentration over most of its range, so these axes are
 # spaced by ratio; oxygenation mixes two absorbers linearly. Steps keep linear interpolation between entries
-# within Delta E 0.3 (tests/domain/test_lut.py measures it).
+# within Delta E 0.3 at a table_step of 1 (tests/domain/test_lut.py measures it).
 _LOG_STEP = {"hemoglobin": 0.24, "melanin": 0.20}
 _LINEAR_STEP = {"oxygenation": 0.15}
 # A logarithm needs a floor: below these fractions an absorber no longer shows.
@@ -44,6 +45,7 @@ class Plan:
     """What will be simulated for a scene, and why."""
 
     scene: Scene
+    settings: Settings
     decisions: Mapping[str, Activation]
     axes: tuple[Axis, ...]
     fragments: tuple[Fragment, ...]
@@ -55,7 +57,7 @@ class Plan:
 
     def without(self, effect_id: str) -> Plan:
         """The plan as it would be if one effect did not exist, to price that effect."""
-        return _decide(self.scene, tuple(effect for effect in EFFECTS if effect.id != effect_id))
+        return _decide(self.scene, self.settings, tuple(effect for effect in EFFECTS if effect.id != effect_id))
 
     @property
     def entries(self) -> int:
@@ -63,18 +65,19 @@ class Plan:
         return math.prod(axis.count for axis in self.axes) if scattering.EFFECT in self.active else 0
 
 
-def make_plan(scene: Scene) -> Plan:
-    """Decides from the scene alone; does none of the work."""
-    return _decide(scene, EFFECTS)
+def make_plan(scene: Scene, settings: Settings | None = None) -> Plan:
+    """Decides from the scene alone, at some quality (the default one if none is given); does none of the work."""
+    return _decide(scene, settings or preset(DEFAULT).settings, EFFECTS)
 
 
-def _decide(scene: Scene, effects: tuple[Effect, ...]) -> Plan:
+def _decide(scene: Scene, settings: Settings, effects: tuple[Effect, ...]) -> Plan:
     decisions = {effect.id: effect.activate(scene) for effect in effects}
     active = [effect for effect in effects if decisions[effect.id].active]
-    axes = _axes(scene, active)
+    axes = _axes(scene, active, settings.table_step)
     fragments = [effect.fragment(scene) for effect in active]
     return Plan(
         scene=scene,
+        settings=settings,
         decisions=decisions,
         axes=axes,
         fragments=tuple(f for f in fragments if f is not None),
@@ -98,7 +101,7 @@ def check_strengths(given: Mapping[str, float], where: str) -> dict[str, float]:
     return strengths
 
 
-def _axes(scene: Scene, active: list[Effect]) -> tuple[Axis, ...]:
+def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, ...]:
     """The chromophores that differ between places or moments, with the range each one takes."""
     regions = (*scene.regions, ELSEWHERE)
     bounds: Bounds = {
@@ -110,7 +113,7 @@ def _axes(scene: Scene, active: list[Effect]) -> tuple[Axis, ...]:
     for name in AXIS_CHROMOPHORES:
         low = min(interval[0] for interval in bounds[name].values())
         high = max(interval[1] for interval in bounds[name].values())
-        axis = _axis(name, low, high)
+        axis = _axis(name, low, high, table_step)
         if axis:
             axes.append(axis)
     return tuple(axes)
@@ -125,12 +128,12 @@ def _slider_reach(scene: Scene, name: str) -> tuple[float, float]:
     return scene.skin[name], scene.skin[name]
 
 
-def _axis(name: str, low: float, high: float) -> Axis | None:
+def _axis(name: str, low: float, high: float, table_step: float) -> Axis | None:
     if name in _LOG_STEP:
         low, high = max(low, _LOG_FLOOR[name]), max(high, _LOG_FLOOR[name])
-        span, step = math.log(high / low), _LOG_STEP[name]
+        span, step = math.log(high / low), table_step * _LOG_STEP[name]
     else:
-        span, step = high - low, _LINEAR_STEP[name]
+        span, step = high - low, table_step * _LINEAR_STEP[name]
     if span < 1e-9:
         return None
     return Axis(name, low, high, max(2, math.ceil(span / step) + 1), name in _LOG_STEP)

@@ -31,7 +31,7 @@ def assemble(plan: Plan) -> dict[str, Shader]:
     axes = plan.axes
     defines = {
         "AXES": len(axes),
-        "TABLE_HEIGHT": float(table_height(axes)),
+        "TABLE_HEIGHT": float(table_height(axes, plan.settings.lobes)),
         "FILM": int("film" in from_points),
     }
     for i, axis in enumerate(axes):
@@ -44,7 +44,11 @@ def assemble(plan: Plan) -> dict[str, Shader]:
         }
     shaders = {
         "chromophores": _assemble("chromophores", plan.fragments, defines),
-        "surface": _assemble("surface", plan.fragments, {"MIX": int(len(axes) > 2), "RELIEF": int("relief" in stages)}),
+        "surface": _assemble(
+            "surface",
+            plan.fragments,
+            {"LOBES": plan.settings.lobes, "MIX": int(len(axes) > 2), "RELIEF": int("relief" in stages)},
+        ),
     }
     if "relief" in stages:
         shaders["relief"] = _assemble("relief", plan.fragments, {})
@@ -67,6 +71,6 @@ def _declare(item: ShaderInput) -> str:
     return f"{item.type} {item.name} = {float(item.default)}"
 
 
-def lobe_sockets(suffix: str = "") -> list[str]:
+def lobe_sockets(lobes: int = LOBES, suffix: str = "") -> list[str]:
     """Names of the surface shader's lobe inputs in the order of the table's quantities."""
-    return [f"{kind}_{k}{suffix}" for kind in ("weight", "d_mm") for k in range(LOBES)]
+    return [f"{kind}_{k}{suffix}" for kind in ("weight", "d_mm") for k in range(lobes)]

@@ -15,6 +15,7 @@ from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
 from .plan import check_strengths
+from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -119,7 +120,8 @@ class Camera(_Table):
 class Image(_Table):
     width: Annotated[int, pydantic.Field(ge=16, le=16384)] = 640
     height: Annotated[int, pydantic.Field(ge=16, le=16384)] = 800
-    samples: Annotated[int, pydantic.Field(ge=1, le=65536)] = 64
+    # Left out, the shot's quality decides.
+    samples: Annotated[int, pydantic.Field(ge=1, le=65536)] | None = None
     denoise: bool = True
     view_transform: str = ""
     seed: Annotated[int, pydantic.Field(ge=0, le=2_147_483_647)] = 0
@@ -134,9 +136,24 @@ class Shot(_Table):
     subject: list[Subject] = []
     expression: list[Expression] = []
     timeline: Timeline | None = None
+    quality: str = DEFAULT
     light: Light = Light()
     camera: Camera = Camera()
     image: Image = Image()
+
+    @pydantic.field_validator("quality")
+    @classmethod
+    def _known_quality(cls, value: str) -> str:
+        return preset(value).preset
+
+    @property
+    def chosen_quality(self) -> Choice:
+        """The preset the file names, with the samples it names besides."""
+        point, samples = preset(self.quality), self.image.samples
+        if samples is None or samples == point.samples:
+            return Choice(point.settings, point, f"quality is '{self.quality}'")
+        because = f"quality is '{self.quality}', but image.samples is {samples} instead of {point.samples}"
+        return Choice(point.settings.model_copy(update={"samples": samples}), None, because)
 
     @property
     def subjects(self) -> list[Subject]:

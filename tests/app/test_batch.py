@@ -9,6 +9,7 @@ import sanguine_core
 from sanguine.app.batch import render_batch
 from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.errors import InputError
+from sanguine.domain.quality import PRESETS, choice
 from sanguine.domain.shot import jobs, pose_of, read_shot
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "five_expressions.toml"
@@ -133,3 +134,16 @@ def test_timeline_and_subjects(tmp_path):
     render_batch(shot, path, tmp_path / "out", renderer)
     assert [name for name, _ in renderer.prepared] == ["ann", "bob"]
     assert renderer.prepared[0][1].decisions["perfusion"].frames == ("ann_000005", "ann_000009")
+
+
+def test_quality_reaches_the_plan_and_the_manifest_and_another_one_renders_anew(shot, tmp_path):
+    first = PaintRenderer()
+    render_batch(shot, EXAMPLE, tmp_path, first, quality=choice("draft", None))
+    assert first.prepared[0][1].settings == PRESETS["draft"].settings
+    rows = [row for row in manifest(tmp_path)["files"] if row["file"] == "anger.png"]
+    assert rows[0]["parameters"]["quality"] == PRESETS["draft"].settings.model_dump()
+    again, other = PaintRenderer(), PaintRenderer()
+    render_batch(shot, EXAMPLE, tmp_path, again, resume=True, quality=choice("draft", None))
+    assert not again.rendered
+    render_batch(shot, EXAMPLE, tmp_path, other, resume=True, quality=choice("reference", None))
+    assert len(other.rendered) == 5

@@ -5,6 +5,7 @@ import pytest
 import sanguine
 from sanguine.blender import operators, panels
 from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.quality import DEFAULT, PRESETS
 
 
 @pytest.fixture
@@ -79,6 +80,23 @@ def test_apply_gives_material_sliders_and_panel(addon, engine):
     # The controls are found from the face and from the rig.
     bpy.context.view_layer.objects.active = face.parent
     assert operators.active_face(bpy.context) == face
+
+
+def test_quality_is_shown_with_its_numbers_and_acts(addon):
+    face = grid()
+    assert face.sanguine.quality == DEFAULT
+    for name, point in PRESETS.items():
+        face.sanguine.quality = name
+        assert bpy.context.scene.cycles.samples == point.samples
+        drawn = draw(panels.SANGUINE_PT_skin)
+        assert "quality" in drawn and point.measured in drawn
+        assert operators.live_plan(face).settings == point.settings
+    face.sanguine.quality = "draft"
+    bpy.ops.sanguine.apply_skin()
+    group = face.material_slots[0].material.node_tree.nodes[0].node_tree
+    read = {node.label for node in group.nodes if node.bl_idname == "ShaderNodeTexImage" and node.label.startswith("d_mm_")}
+    assert len({label.removesuffix("_high") for label in read}) == PRESETS["draft"].lobes
+    assert {image.size[0] for image in bpy.data.images if image.name.endswith(" anatomy")} == {PRESETS["draft"].map_size}
 
 
 def test_face_keeps_its_place_when_it_gets_a_rig(addon):

@@ -125,3 +125,20 @@ def test_help_needs_no_native_module(tmp_path):
     (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['sanguine_core'] = None")
     result = run("--help", env=os.environ | {"PYTHONPATH": str(tmp_path)})
     assert result.returncode == 0 and "render" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--quality", "finel"], ["--quality", "did you mean 'final'"]),
+        (["--delta-e", "0.001"], ["--delta-e", "no measured setting", "the best"]),
+        (["--delta-e", "nan"], ["--delta-e", "above 0"]),
+        (["--delta-e", "much"], ["--delta-e", "much"]),
+        (["--quality", "final", "--delta-e", "2"], ["not allowed with"]),
+    ],
+)
+@pytest.mark.parametrize("verb", ["plan", "render"])
+def test_bad_quality(tmp_path, verb, flags, words):
+    out = ["--out", str(tmp_path / "out")] if verb == "render" else []
+    assert_one_line(run(verb, EXAMPLE, *flags, *out), *words)
+    assert not (tmp_path / "out").exists()

@@ -16,6 +16,7 @@ from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.film import film_albedo
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import make_plan
+from sanguine.domain.quality import DEFAULT, preset
 from support.patch import (
     camera_above,
     empty_scene,
@@ -55,8 +56,10 @@ def said(skin):
     return np.array(report(["skin"], [skin], np.array([550.0]))["results"][0]["linear_rec709"])
 
 
-def plan_of(skin, live=False):
-    return make_plan(Scene(skin, (Frame("0"),), live=live))
+def plan_of(skin, live=False, lobes=None):
+    settings = preset(DEFAULT).settings
+    settings = settings.model_copy(update={"lobes": lobes}) if lobes else settings
+    return make_plan(Scene(skin, (Frame("0"),), live=live), settings)
 
 
 def furnace_scene(skin, live, samples=64, tilt=0.0, space="Linear Rec.709"):
@@ -95,6 +98,16 @@ def test_colour_is_what_skin_says(changes):
     """Delta E 2000 within 1.5 (the issue's bar)."""
     skin = default_skin() | changes | {"oil": 0.0}
     furnace_scene(skin, live=False)
+    assert difference(skin) < 1.5
+
+
+@pytest.mark.parametrize("live", [False, True], ids=["constant", "table"])
+@pytest.mark.parametrize("lobes", [1, 2, 3])
+def test_fewer_lobes_keep_the_colour(lobes, live):
+    """A coarser profile spreads light differently; how much comes back stays as it is."""
+    skin = default_skin() | SKINS[4] | {"oil": 0.0}
+    furnace_scene(skin, live)
+    bpy.data.objects["patch"].data.materials[0] = build_skin_material("fewer", plan_of(skin, live, lobes), {})
     assert difference(skin) < 1.5
 
 
