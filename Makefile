@@ -19,6 +19,7 @@ lists = $(1:%=tools/requirements-%.txt)
 BUILD_STAMP := $(VENV)/.build-$(call hash,$(call lists,build))
 RUN_STAMP := $(VENV)/.run-$(call hash,$(call lists,addon run))
 TEST_STAMP := $(VENV)/.test-$(call hash,$(call lists,test))
+BENCH_STAMP := $(VENV)/.bench-$(call hash,$(call lists,test bench))
 NATIVE_STAMP := $(VENV)/.native
 ADDON_STAMP := $(VENV)/.addon
 OIIO := .cache/openimageio
@@ -31,7 +32,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test soak docs native setup openimageio stub extension matrix clean system
+.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -50,6 +51,11 @@ test: setup $(TEST_STAMP) ## Install what is needed and run every test
 
 soak: setup $(TEST_STAMP) ## Look for stacks and skins that break the optics, for an hour or so
 	$(PY) -m pytest tests/stability --soak
+
+bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour, on an idle machine)
+	$(VENV)/bin/sanguine bench accuracy
+	$(PY) bench/measured_skin.py
+	$(PY) bench/picture.py
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
 
@@ -90,6 +96,10 @@ $(RUN_STAMP): | $(PY)
 $(TEST_STAMP): | $(PY)
 	$(PIP) --no-deps --requirement tools/requirements-test.txt
 	@rm -f $(VENV)/.test-* && touch $@
+
+$(BENCH_STAMP): | $(PY)
+	$(PIP) --no-deps --requirement tools/requirements-bench.txt
+	@rm -f $(VENV)/.bench-* && touch $@
 
 $(OIIO_STAMP): | $(BUILD_STAMP)
 	$(PY) tools/fetch_openimageio.py $(OIIO)

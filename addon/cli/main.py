@@ -71,6 +71,11 @@ def _parser() -> argparse.ArgumentParser:
                      help="let these go where the data lead, for example melanin_blend or bilirubin_umol_per_l")
     fit.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    bench = _verb(verbs, "bench", _bench, "measure what accuracy costs in time; for a checkout of the sources")
+    bench.add_argument("what", choices=["accuracy"], help="accuracy: every solver and setting of the optics")
+    bench.add_argument("--quick", action="store_true", help="a few cases, seconds instead of minutes")
+    bench.add_argument("--out", metavar="DIR", help="folder for accuracy.json and accuracy.md (default bench/results)")
+
     plan = _verb(verbs, "plan", _plan, "what a shot will simulate, and why, without doing it")
     plan.add_argument("shot", metavar="SHOT.toml")
     _quality_flags(plan)
@@ -148,6 +153,22 @@ def _fit(options: argparse.Namespace) -> int:
         print(f"sanguine: specular taken as {report['specular']} (--specular says otherwise)", file=sys.stderr)
     _answer(report, options.out)
     return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    import importlib.util
+    import subprocess
+    from pathlib import Path
+
+    script = Path(__file__).resolve().parents[2] / "bench" / f"{options.what}.py"
+    if not script.is_file():
+        raise InputError("bench: needs a checkout of the sources: its cases and scripts are not in the add-on")
+    for module in ("colour", "iadpython", *([] if options.quick else ["matplotlib"])):
+        if importlib.util.find_spec(module) is None:
+            raise InputError(f"bench: no module '{module}': pip install --no-deps -r tools/requirements-bench.txt")
+    # A process of its own: nothing that was loaded or computed before is in its times.
+    flags = [*(["--quick"] if options.quick else []), *(["--out", options.out] if options.out is not None else [])]
+    return subprocess.run([sys.executable, str(script), *flags]).returncode
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -1,5 +1,5 @@
-// Rungs of the ladder with their settings in the caller's hand, for measurements: no tolerance decides. (Monte Carlo has
-// solve() with `max_photons`.)
+// Rungs of the ladder with their settings in the caller's hand, for measurements: no tolerance decides. (For Monte
+// Carlo solve() has `max_photons`.)
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
@@ -20,7 +20,8 @@ Problem checked(const LayersIn& layers, const std::string& incidence, const std:
     double last = 0;
     for (const double r : problem.radii_mm) {
         if (!(r > last && r <= 1e9))
-            throw std::invalid_argument("radii_mm: " + std::to_string(r) + " is not above 0, up to 1e9 and above the one before");
+            throw std::invalid_argument("radii_mm: " + std::to_string(r)
+                                        + " is not above 0, up to 1e9 and above the one before");
         last = r;
     }
     return problem;
@@ -28,8 +29,8 @@ Problem checked(const LayersIn& layers, const std::string& incidence, const std:
 
 void check_range(const char* name, long long value, long long low, long long high) {
     if (value < low || value > high)
-        throw std::invalid_argument(std::string(name) + ": " + std::to_string(value) + " is outside " + std::to_string(low)
-                                    + " to " + std::to_string(high));
+        throw std::invalid_argument(std::string(name) + ": " + std::to_string(value) + " is outside "
+                                    + std::to_string(low) + " to " + std::to_string(high));
 }
 
 nb::dict py_adding_doubling(const LayersIn& layers, const std::string& incidence, int streams) {
@@ -79,5 +80,5 @@ void bind_bench(nb::module_& m) {
           "Totals of a stack (as in solve()) with a given number of directions per hemisphere, as a dict.");
     m.def("multipole", &py_multipole, "layers"_a, "radii_mm"_a = nb::none(), "terms"_a = all_terms,
           "The classical multipole as it comes, without checks: a dict of R, T and R_per_mm2 per unit of light that\n"
-          "enters the stack. May be negative. terms: N for the dipoles -N to N of each layer, -1 for their closed sum.");
+          "enters the stack. May be negative. terms: N for the dipoles -N to N of a layer, -1 for their closed sum.");
 }

@@ -136,7 +136,7 @@ def adding_doubling(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 
 def multipole(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), order='C', device='cpu', writable=False)], radii_mm: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, terms: int = -1) -> dict:
     """
     The classical multipole as it comes, without checks: a dict of R, T and R_per_mm2 per unit of light that
-    enters the stack. May be negative. terms: N for the dipoles -N to N of each layer, -1 for their closed sum.
+    enters the stack. May be negative. terms: N for the dipoles -N to N of a layer, -1 for their closed sum.
     """
 
 class ImageError(OSError):
