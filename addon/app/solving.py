@@ -21,6 +21,9 @@ DEFAULT_RADII_MM = np.geomspace(0.011, 18.2, 40)
 
 MAX_CASES = 100_000
 
+# Radii of all cases together: the answer is held in memory until it is written, about 100 bytes for each.
+MAX_RADII = 20_000_000
+
 
 class _Layer(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -89,13 +92,15 @@ def answer(
     `radii_mm` holds for the cases without radii of their own; None is DEFAULT_RADII_MM, an empty list totals alone.
     A case that cannot be solved has `error` set and no numbers, and the others are still answered.
     """
+    if radii_mm is None:
+        # Nobody asked: a solver without profiles is not blamed for it.
+        radii_mm = [] if solver == "adding-doubling" else DEFAULT_RADII_MM
+    asked_mm = [radii_mm if case.radii_mm is None else case.radii_mm for case in cases]
+    if (total := sum(map(len, asked_mm))) > MAX_RADII:
+        raise InputError(f"{total} radii in {len(cases)} cases, at most {MAX_RADII} are allowed: solve fewer at once")
     results = []
-    for i, case in enumerate(cases):
+    for i, (case, asked) in enumerate(zip(cases, asked_mm)):
         progress(f"solve {case.id}", i, len(cases))
-        asked = case.radii_mm if case.radii_mm is not None else radii_mm
-        if asked is None:
-            # Nobody asked: a solver without profiles is not blamed for it.
-            asked = [] if solver == "adding-doubling" else DEFAULT_RADII_MM
         results.append(_result(case, solver, tolerance, np.asarray(asked, dtype=np.float64), max_seconds))
     progress("solved", len(cases), len(cases))
     return {"sanguine": sanguine_core.__version__, "results": results}

@@ -127,8 +127,10 @@ def _skin(options: argparse.Namespace) -> int:
 
 def _solve(options: argparse.Namespace) -> int:
     from ..app.solving import answer, check_solver, read_cases
+    from ..domain.files import check_file
     from .progress import reporter
 
+    check_file(options.out)
     radii_mm = None if options.radii is None else _radii(options.radii)
     check_solver(options.solver)
     cases = read_cases(options.cases)
@@ -143,8 +145,10 @@ def _solve(options: argparse.Namespace) -> int:
 
 def _fit(options: argparse.Namespace) -> int:
     from ..app.fitting import fit_report, read_spectra
+    from ..domain.files import check_file
     from .progress import reporter
 
+    check_file(options.out)
     spectra = read_spectra(options.spectra)
     free = [name for name in options.free.split(",") if name]
     with reporter(options.json_progress) as progress:
@@ -213,15 +217,22 @@ def _render(options: argparse.Namespace) -> int:
     return 0
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+
+
 def _share(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and at most 1")
     return value
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
     return value

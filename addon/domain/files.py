@@ -117,6 +117,15 @@ def check_folder(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{path}: cannot be written: {folder} is not a folder that may be written to")
 
 
+def check_file(path: str | os.PathLike[str] | None) -> None:
+    """Raises InputError if `path` could not be written: better before long work than after. None is standard output."""
+    if path is None:
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{path}: cannot be written: Is a directory")
+    check_folder(Path(path).absolute().parent)
+
+
 @contextlib.contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path beside `path` (same suffix) and renames it over `path` on success.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sanguine_core
 
-from sanguine.app.solving import answer, read_cases
+from sanguine.app.solving import Case, answer, read_cases
 from sanguine.domain.errors import InputError
 
 FILE = Path(__file__).resolve().parents[1] / "reference" / "monte_carlo_cases.json"
@@ -85,6 +85,32 @@ def test_a_hopeless_case_leaves_the_others_answered(cases):
     assert second["error"] is None
 
 
+def test_auto_asks_no_photons_for_totals_that_are_known():
+    """A millionth part of the light gets through: Monte Carlo's own totals would take a minute and miss the tolerance."""
+    slab = np.array([[0.05, 30.0, 0.5, 1.4, 10.0]])
+    found = sanguine_core.solve(slab, "normal", np.geomspace(0.02, 20, 20), tolerance=0.02, max_seconds=40.0)
+    assert found["solver"] == "adding-doubling+monte-carlo"
+    exact = sanguine_core.solve(slab, solver="adding-doubling", tolerance=1e-4)
+    assert exact["Tt"] < 1e-5
+    assert found["Tt"] == pytest.approx(exact["Tt"], rel=1e-3)  # ten times what adding-doubling is asked for
+    assert found["error_estimate"] >= exact["error_estimate"]
+
+
+@pytest.mark.parametrize("radius_mm", [1e13, 1e300])
+def test_radii_beyond_all_light_hold_none(radius_mm):
+    layers = np.array([[0.1, 10.0, 0.5, 1.4, math.inf]])
+    for solver in ("monte-carlo", "multipole"):
+        found = sanguine_core.solve(layers, "normal", np.array([radius_mm, 2 * radius_mm]), solver, tolerance=0.1)
+        assert np.all(found["R_per_mm2"] < 1e-20), solver
+
+
+def test_an_answer_beyond_memory_is_refused_before_work():
+    layer = {"mu_a": 1.0, "mu_s": 10.0, "g": 0.8, "n": 1.4, "thickness": None}
+    many = [Case.model_validate({"id": "a", "layers": [layer]})] * 1000
+    with pytest.raises(InputError, match="radii in 1000 cases"):
+        ask(many, radii_mm=np.linspace(1, 2, 100_000))
+
+
 def test_cancel_and_progress():
     slow = np.array([[1e-6, 100.0, 0.9, 1.4, math.inf]])
     with pytest.raises(sanguine_core.Cancelled):
@@ -102,7 +128,7 @@ def test_same_answer_on_any_number_of_threads():
 
 def test_what_cannot_be_is_refused():
     good = [0.1, 1.0, 0.0, 1.4, math.inf]
-    for column, value in [(0, math.nan), (1, -1.0), (1, math.inf), (2, 1.0), (3, 0.5), (4, 0.0), (4, math.nan)]:
+    for column, value in [(0, math.nan), (1, -1.0), (1, math.inf), (2, 1.0), (3, 0.5), (4, 0.0), (4, math.nan), (4, 1e300)]:
         layers = np.array([good])
         layers[0, column] = value
         with pytest.raises(ValueError, match="layers.0"):

@@ -40,6 +40,8 @@ def test_status_2_for_bad_input(tmp_path):
     for cases, flags, words in [
         ([case], ["--solver", "adding"], ["--solver", "adding-doubling"]),
         ([case], ["--tolerance", "0"], ["--tolerance", "0"]),
+        ([case], ["--tolerance", "low"], ["--tolerance", "'low' is not a number"]),
+        ([case], ["--out", str(tmp_path)], [str(tmp_path), "directory"]),  # before the work, not after
         ([case], ["--radii", "1,0.5"], ["--radii"]),
         ([case], ["--radii", "red"], ["--radii", "red"]),
         ([{"id": "a", "layers": "skin"}], [], ["cases.0.layers"]),

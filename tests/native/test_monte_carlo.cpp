@@ -1,9 +1,11 @@
 #include "sanguine/monte_carlo.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -250,6 +252,29 @@ TEST(MonteCarlo, CanBeWatchedAndCancelled) {
     effort.tolerance = 1e-6;  // hours
     effort.progress = [](std::size_t, std::size_t) { return false; };
     EXPECT_THROW(monte_carlo_solver().solve({c.layers, c.incidence, {}}, effort), Cancelled);
+
+    effort.progress = [](std::size_t, std::size_t) -> bool { throw std::domain_error("no more"); };
+    EXPECT_THROW(monte_carlo_solver().solve({c.layers, c.incidence, {}}, effort), std::domain_error);
+}
+
+TEST(MonteCarlo, LightOfTooFewPhotonsIsNotKnownToBeNone) {
+    // A billionth of it reaches the bottom.
+    Effort effort = one_thread(1);
+    effort.profile_alone = true;
+    effort.max_photons = 1024;
+    const Solution profile = monte_carlo_solver().solve({{{5, 30, 0, 1, 1.0}}, Incidence::normal, {0.1, 0.2}}, effort);
+    EXPECT_EQ(*std::max_element(profile.T_per_mm2.begin(), profile.T_per_mm2.end()), 0);
+    EXPECT_GE(profile.error_estimate, 0.48);  // one photon in 1024, halved, per share of 0.001
+}
+
+TEST(MonteCarlo, FreePathsBeyondAllNumbersAreRefused) {
+    const auto reason = [](double mu, double thickness) {
+        return monte_carlo_solver().unsuited({{{mu, mu, 0, 1.4, thickness}}, Incidence::normal, {}});
+    };
+    EXPECT_NE(reason(1e-310, half_space), "");
+    EXPECT_EQ(reason(1e-290, half_space), "");
+    EXPECT_EQ(reason(1e-310, 1), "");  // leaves at the other side
+    EXPECT_EQ(reason(0, half_space), "");
 }
 
 TEST(MonteCarlo, ConservativeHalfSpaceReturnsAllLight) {

@@ -52,8 +52,7 @@ TEST(Unscattered, WeakenedByBeerAndLambert) {
 }
 
 TEST(Unscattered, DiffuseSpecularHasAClosedForm) {
-    // Walsh's formula itself loses digits as n nears 1.
-    for (const double n : {1.2, 1.4, 1.5, 2.0, 3.0, 4.0}) {
+    for (const double n : {1.0, 1 + 1e-12, 1 + 1e-6, 1.001, 1.05, 1.2, 1.4, 1.5, 2.0, 3.0, 4.0}) {
         const std::vector<Layer> stack{{1, 0, 0, n, half_space}};
         EXPECT_NEAR(unscattered(stack, Incidence::diffuse).specular, diffuse_fresnel(n), 1e-13) << n;
     }

@@ -54,9 +54,6 @@ struct PhotonEnd {
 /// A half-space has to absorb or scatter, else a photon may never end; at most `max_layers` layers.
 PhotonEnd trace_photon(std::span<const Layer> stack, Incidence incidence, PhotonRandom& random);
 
-/// What the first surface reflects, `n` that of the first layer.
-double surface_reflectance(double n, Incidence incidence);
-
 /// What one weighted photon adds to each tally; shares of one incident photon.
 struct WeightedEnd {
     enum class Exit { none, top, bottom, cut };

@@ -28,6 +28,7 @@ struct Effort {
     std::uint64_t seed = 1;
     int threads = 0;                  ///< 0: one per core
     Progress progress;                ///< may be empty
+    bool profile_alone = false;       ///< the totals are known already: their noise asks for no photons
 };
 
 /// The answer; shares of the incident light.
@@ -48,6 +49,9 @@ struct Solution {
 };
 
 inline constexpr std::size_t max_radii = 100000;
+
+/// Throws std::invalid_argument unless there are at most max_radii, above 0, finite and ascending.
+void check_radii(std::span<const double> radii_mm);
 
 /// A solver cannot answer this problem, or knows that its answer would be wrong.
 struct SolverError : std::runtime_error {

@@ -26,7 +26,8 @@ enum class Incidence {
 };
 
 /// Throws std::invalid_argument naming the layer, the key, the value and what is allowed: 1 to max_layers layers;
-/// mu_a and mu_s 0 to 1e7, g -1 < g < 1, n 1 to 4, thickness above 0 (infinite in the last layer alone).
+/// mu_a and mu_s 0 to 1e7, g -1 < g < 1, n 1 to 4, thickness above 0 and up to 1e100
+/// (infinite in the last layer alone).
 void check_stack(std::span<const Layer> stack);
 
 }  // namespace sanguine

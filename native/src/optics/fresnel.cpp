@@ -1,6 +1,7 @@
 #include "sanguine/fresnel.hpp"
 
 #include <cmath>
+#include <initializer_list>
 
 namespace sanguine {
 
@@ -17,11 +18,35 @@ double fresnel_dielectric(double cos_i, double n_i, double n_t, double& cos_t) {
 }
 
 double diffuse_fresnel(double n) {
-    const double n2 = n * n, n4 = n2 * n2;
-    return 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) * (n + 1))
-         + n2 * (n2 - 1) * (n2 - 1) / ((n2 + 1) * (n2 + 1) * (n2 + 1)) * std::log((n - 1) / (n + 1))
-         - 2 * n2 * n * (n2 + 2 * n - 1) / ((n2 + 1) * (n4 - 1))
-         + 8 * n4 * (n4 + 1) / ((n2 + 1) * (n4 - 1) * (n4 - 1)) * std::log(n);
+    if (n == 1)
+        return 0;
+    // Walsh's terms with t = (n - 1) / (n + 1), for which ln n = 2 atanh t. Those that grow without bound as n nears 1
+    // cancel in the polynomials, so that every digit is left: the result falls as t itself.
+    const double t = (n - 1) / (n + 1), t2 = t * t;
+    const auto polynomial = [t](std::initializer_list<double> falling) {
+        double sum = 0;
+        for (const double coefficient : falling)
+            sum = sum * t + coefficient;
+        return sum;
+    };
+    // (atanh(t) / t - 1) / t^2
+    double rest = 0;
+    if (t < 0.25)
+        for (int k = 27; k >= 3; k -= 2)
+            rest = rest * t2 + 1.0 / k;
+    else
+        rest = (std::atanh(t) / t - 1) / t2;
+    const double even = polynomial({1, 2, 4, 10, -2, -10, -4, 14, 1})
+                      + polynomial({1, 2, 5, 8, -6, -20, -6, 8, 5, 2, 1}) * rest;
+    const double denominator = (1 + t2) * (1 + t2) * (1 + t2);
+    return t * (even / (4 * denominator) + (2 + t) / 6 + 2 * t * (1 + t) * (1 + t) / denominator * std::log(t));
+}
+
+double surface_reflectance(double n, Incidence incidence) {
+    if (incidence == Incidence::diffuse)
+        return diffuse_fresnel(n / outside_index);
+    double cos_t;
+    return fresnel_dielectric(1, outside_index, n, cos_t);
 }
 
 }  // namespace sanguine

@@ -232,9 +232,7 @@ PathTable::PathTable(std::span<const std::uint8_t> file) {
          {reference_absorption, max_thickness, first_radius, radius_ratio, first_path, path_ratio})
         expect(number);
 
-    double cos_t;
-    entry_ = 1 - (incidence_ == Incidence::diffuse ? diffuse_fresnel(refractive_index)
-                                                   : fresnel_dielectric(1, outside_index, refractive_index, cos_t));
+    entry_ = 1 - surface_reflectance(refractive_index, incidence_);
     nodes_.resize(nodes);
     std::vector<float> counts(rings * bins * bins);  // [ring][L1][L2]
     for (Node& node : nodes_) {

@@ -203,24 +203,6 @@ struct WeightedWalk::Ray {
     std::uint32_t faces = 0;
 };
 
-double surface_reflectance(double n, Incidence incidence) {
-    if (n == outside_index)
-        return 0;
-    double cos_t;
-    if (incidence == Incidence::normal)
-        return fresnel_dielectric(1, outside_index, n, cos_t);
-    if (n > 1.01)
-        return diffuse_fresnel(n);
-    // The closed form cancels as n nears 1. Midpoints in mu, which reach the grazing angles where the reflection is.
-    constexpr int steps = 2000;
-    double sum = 0;
-    for (int i = 0; i < steps; ++i) {
-        const double mu = (i + 0.5) / steps;
-        sum += 2 * mu * fresnel_dielectric(mu, outside_index, n, cos_t);
-    }
-    return sum / steps;
-}
-
 WeightedWalk::WeightedWalk(std::span<const Layer> stack, Incidence incidence, std::uint32_t max_steps)
     : layers_(static_cast<int>(stack.size())), incidence_(incidence), max_steps_(max_steps),
       entering_(1 - surface_reflectance(stack[0].n, incidence)) {

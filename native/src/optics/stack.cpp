@@ -29,8 +29,9 @@ void check_stack(std::span<const Layer> stack) {
             refuse(i, "g", layer.g, "between -1 and 1");
         if (!(layer.n >= 1 && layer.n <= 4))
             refuse(i, "n", layer.n, "within 1 to 4");
-        if (!(layer.thickness > 0))
-            refuse(i, "thickness", layer.thickness, "above 0 mm");
+        // Beyond any layer there is, and what it is times mu_a and mu_s has to be a number.
+        if (!(layer.thickness > 0 && (layer.thickness <= 1e100 || std::isinf(layer.thickness))))
+            refuse(i, "thickness", layer.thickness, "above 0 and up to 1e100 mm, or infinite");
         if (std::isinf(layer.thickness) && i + 1 != stack.size())
             throw std::invalid_argument("layers." + std::to_string(i)
                                         + ".thickness: only the last layer can be semi-infinite");

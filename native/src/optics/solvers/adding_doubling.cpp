@@ -528,8 +528,12 @@ Totals adding_doubling(std::span<const Layer> stack, Incidence incidence, int st
         if (own > 0)
             scale = direct.scattered / own;
     }
-    totals.Rd = std::max(0.0, scale * solve.reflected(incidence));
-    totals.Tt += std::max(0.0, scale * solve.transmitted(incidence));
+    const double reflected = scale * solve.reflected(incidence), transmitted = scale * solve.transmitted(incidence);
+    // std::max below would make 0 of what is no number.
+    if (!std::isfinite(reflected) || !std::isfinite(transmitted))
+        throw SolverError("adding-doubling: the sum over the layers is not finite");
+    totals.Rd = std::max(0.0, reflected);
+    totals.Tt += std::max(0.0, transmitted);
     return totals;
 }
 

@@ -10,6 +10,7 @@
 #include "sanguine/multipole.hpp"
 #include "sanguine/skin_solver.hpp"
 #include "sanguine/solver.hpp"
+#include "sanguine/unscattered.hpp"
 
 namespace sanguine {
 namespace {
@@ -59,12 +60,19 @@ public:
             return totals;
         }
 
-        Solution s = monte_carlo_solver().solve(problem, effort);
+        const Solver& photons = monte_carlo_solver();
+        if (const std::string reason = photons.unsuited(problem); !reason.empty())
+            throw SolverError(because + "; not Monte Carlo: " + reason);
+        Effort remaining = effort;
+        remaining.profile_alone = have_totals;
+        Solution s = photons.solve(problem, remaining);
         if (have_totals) {
             because += ", Monte Carlo the profile to " + percent(s.error_estimate);
             scale(s.R_per_mm2, totals.Rd, s.Rd);
-            // The profile at the bottom is of scattered light; the unscattered share needs no photons to be known.
-            scale(s.T_per_mm2, totals.Tt, s.Tt);
+            // The profile at the bottom is of scattered light alone.
+            const double direct = unscattered(problem.layers, problem.incidence).transmitted;
+            scale(s.T_per_mm2, totals.Tt - direct, s.Tt - direct);
+            s.error_estimate = std::fmax(s.error_estimate, totals.error_estimate);
             s.solver = "adding-doubling+monte-carlo";
             s.Rd = totals.Rd;
             s.R_unscattered = totals.R_unscattered;
@@ -82,7 +90,7 @@ public:
 
 private:
     static void scale(std::vector<double>& profile, double exact, double estimated) {
-        if (estimated > 0)
+        if (exact > 0 && estimated > 0)
             for (double& value : profile)
                 value *= exact / estimated;
     }
@@ -92,18 +100,11 @@ const Auto automatic;
 
 void check_problem(const Problem& problem, const Effort& effort) {
     check_stack(problem.layers);
-    if (problem.radii_mm.size() > max_radii)
-        throw std::invalid_argument("radii_mm: more than " + std::to_string(max_radii));
-    double last = 0;
-    for (const double r : problem.radii_mm) {
-        if (!(r > last && std::isfinite(r)))
-            throw std::invalid_argument("radii_mm: " + std::to_string(r) + " is not above 0, finite and above the one before");
-        last = r;
-    }
+    check_radii(problem.radii_mm);
     if (!(effort.tolerance > 0 && effort.tolerance <= 1))
-        throw std::invalid_argument("tolerance: " + std::to_string(effort.tolerance) + " is not above 0 and at most 1");
+        throw std::invalid_argument(message("tolerance: ", effort.tolerance, " is not above 0 and at most 1"));
     if (!(effort.max_seconds > 0))
-        throw std::invalid_argument("max_seconds: " + std::to_string(effort.max_seconds) + " is not above 0");
+        throw std::invalid_argument(message("max_seconds: ", effort.max_seconds, " is not above 0"));
     if (effort.max_photons == 0)
         throw std::invalid_argument("max_photons: 0 is not above 0");
     // Not every rung starts threads, but what is nonsense to one is nonsense to all.
@@ -132,6 +133,17 @@ std::span<const Solver* const> solvers() {
     static const std::array<const Solver*, 5> all = {&skin_solver(), &multipole_solver(), &adding_doubling_solver(),
                                                      &monte_carlo_solver(), &automatic};
     return all;
+}
+
+void check_radii(std::span<const double> radii_mm) {
+    if (radii_mm.size() > max_radii)
+        throw std::invalid_argument(message("radii_mm: ", radii_mm.size(), " of them, allowed are ", max_radii));
+    double last = 0;
+    for (const double r : radii_mm) {
+        if (!(r > last && std::isfinite(r)))
+            throw std::invalid_argument(message("radii_mm: ", r, " is not above 0, finite and above the one before"));
+        last = r;
+    }
 }
 
 const Solver& find_solver(std::string_view id) {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "message.hpp"
+#include "sanguine/fresnel.hpp"
 #include "sanguine/photon_tracer.hpp"
 #include "sanguine/unscattered.hpp"
 
@@ -120,8 +121,13 @@ public:
             if (progress)
                 watch = [&](std::size_t, std::size_t) {
                     const std::uint64_t all = std::max(expected, target);
-                    if (!progress(std::min(from + done, all), all))
-                        stopped = true;
+                    try {
+                        if (!progress(std::min(from + done, all), all))
+                            stopped = true;
+                    } catch (...) {
+                        stopped = true;  // nor are the photons under way waited for
+                        throw;
+                    }
                     return !stopped;
                 };
             parallel_for(batches, threads_, watch, [&](std::size_t i) {
@@ -171,6 +177,9 @@ bool returns_all(std::span<const Layer> stack) {
         && std::all_of(stack.begin(), stack.end(), [](const Layer& layer) { return layer.mu_a == 0; });
 }
 
+/// The free path of less is beyond the range of a double.
+constexpr double least_rate_per_mm = 1e-300;
+
 /// Shares below this one are held to its absolute error: a relative one would need 1 / share photons for light that no
 /// picture shows.
 constexpr double small_share = 1e-3;
@@ -186,13 +195,16 @@ Estimate at_least_one_photon(Estimate share, std::uint64_t photons) {
     return share;
 }
 
-/// Expected L1 error of a profile: mean absolute deviation sqrt(2 / pi) sigma of each window, over what they hold.
-double relative_noise(std::span<const RadialDensity> profile) {
+/// Expected L1 error of a profile: mean absolute deviation sqrt(2 / pi) sigma of each window, over what they hold; that
+/// of one photon at least, where there may be any.
+double relative_noise(std::span<const RadialDensity> profile, bool any, std::uint64_t photons) {
     double energy = 0, deviation = 0;
     for (const RadialDensity& d : profile) {
         energy += d.window_energy;
         deviation += std::sqrt(2 / std::numbers::pi * d.window_variance);
     }
+    if (any)
+        deviation = std::fmax(deviation, 1.0 / photons);
     return deviation / std::fmax(energy, small_share);
 }
 
@@ -211,7 +223,13 @@ public:
         return "Photons traced until the tolerance is reached: any stack, no approximation, errors known; slow.";
     }
 
-    std::string unsuited(const Problem&) const override { return ""; }
+    std::string unsuited(const Problem& problem) const override {
+        const Layer& last = problem.layers.back();
+        const double rate = last.mu_a + last.mu_s;
+        if (std::isinf(last.thickness) && rate > 0 && rate < least_rate_per_mm)
+            return message("layers.", problem.layers.size() - 1, ": a free path of ", 1 / rate, " mm is no number to count with");
+        return "";
+    }
 
     Solution solve(const Problem& problem, const Effort& effort) const override;
 };
@@ -235,7 +253,7 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
     // A window may reach 1.25^1.5 beyond a radius.
     RadialRings rings(1, 1);
     if (!radii.empty())
-        rings = RadialRings(radii.front() / 1.5, std::fmin(radii.back() * 1.5, farthest));
+        rings = RadialRings(std::fmin(radii.front() / 1.5, farthest), std::fmin(radii.back() * 1.5, farthest));
     Run run(stack, problem.incidence, effort.seed, effort.threads, radii.empty() ? nullptr : &rings,
             all_returns ? max_steps_conservative : max_steps);
     const double seconds = std::clamp(effort.max_seconds, 0.0, 1e9);
@@ -270,8 +288,11 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
         top = radial_density(rings, t.R_rings, radii);
         if (has_bottom)
             bottom = radial_density(rings, t.T_rings, radii);
-        totals_error = std::fmax(relative_error(t.Rd), has_bottom ? relative_error(t.Tt) : 0);
-        profile_error = radii.empty() ? 0 : std::fmax(relative_noise(top), has_bottom ? relative_noise(bottom) : 0);
+        totals_error = effort.profile_alone ? 0 : std::fmax(relative_error(t.Rd), has_bottom ? relative_error(t.Tt) : 0);
+        profile_error = 0;
+        if (!radii.empty())
+            profile_error = std::fmax(relative_noise(top, scatters, t.photons),
+                                      has_bottom ? relative_noise(bottom, scatters, t.photons) : 0);
         const double excess = std::fmax(totals_error, profile_error / 2) / effort.tolerance;
         if (!in_time || excess <= 1 || target >= effort.max_photons)
             break;

@@ -46,15 +46,6 @@ double index_of_neighbour(std::span<const Layer> layers, std::size_t i, int step
     return j < layers.size() ? layers[j].n : outside_index;
 }
 
-/// `diffuse_fresnel` loses its digits near n = 1, where it is proportional to n - 1.
-double first_surface(const Problem& problem) {
-    const double n = problem.layers.front().n;
-    if (problem.incidence == Incidence::normal)
-        return (n - 1) * (n - 1) / ((n + 1) * (n + 1));
-    constexpr double near = 1e-3;
-    return n - 1 < near ? (n - 1) / near * diffuse_fresnel(1 + near) : diffuse_fresnel(n);
-}
-
 /// Values below what the transform can tell from 0 become 0. Returns the share of negative light among all of it;
 /// where that is small it is cut off, too.
 double cut_negative(std::span<const double> radii, std::span<const HankelResult> results, int which, double scale,
@@ -198,7 +189,7 @@ Solution Multipole::solve(const Problem& problem, const Effort& effort) const {
     const bool finite = problem.layers.back().thickness != half_space;
     Solution solution;
     solution.solver = id();
-    solution.specular = first_surface(problem);
+    solution.specular = surface_reflectance(problem.layers.front().n, problem.incidence);
     const double entering = 1 - solution.specular;
 
     // What each layer does by itself says where the method has left its ground.

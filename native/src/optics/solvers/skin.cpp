@@ -116,10 +116,7 @@ public:
         const Point p = table_point(problem);
         Solution out;
         out.solver = id();
-        double cos_t;
-        out.specular = problem.incidence == Incidence::diffuse
-                           ? diffuse_fresnel(problem.layers[0].n)
-                           : fresnel_dielectric(1, outside_index, problem.layers[0].n, cos_t);
+        out.specular = surface_reflectance(problem.layers[0].n, problem.incidence);
         const PathTable::Uncertainty uncertainty = table.uncertainty(p.tau, p.a1, p.a2);
         out.Rd = table.total(p.tau, p.a1, p.a2);
         out.error_estimate = std::fmin(1, uncertainty.total + (out.Rd > 0 ? bin_error / std::sqrt(out.Rd) : 1));
