@@ -51,6 +51,7 @@ def tally_lines(seen: Seen) -> list[str]:
 
 def share(value: float) -> str:
     """Four digits; negative or impossible light in bold."""
+    value += 0.0  # no -0
     text = f"{value:.4f}" if 1e-3 <= abs(value) < 10 or value == 0 else f"{value:.1e}"
     return text if 0 <= value <= 1 + extremes.ENERGY else f"**{text}**"
 

@@ -118,9 +118,10 @@ def test_reciprocity(stack):
 @extremes.examples(10)
 @given(extremes.moderate_stacks())
 def test_reciprocity_of_photons(stack):
-    """The same by Monte Carlo: within the sum of both stated errors (three standard errors each)."""
+    """The same by Monte Carlo: within the sum of both stated errors (three standard errors each) and 1e-12 (rounding,
+    where nothing scatters and nothing is random)."""
     down, up = (ask(s, "monte-carlo", "diffuse", max_photons=8192) for s in (stack, stack[::-1]))
-    assert abs(down.Tt - up.Tt) <= (down.error + up.error) * max(down.Tt, up.Tt, 1e-3)
+    assert abs(down.Tt - up.Tt) <= (down.error + up.error) * max(down.Tt, up.Tt, 1e-3) + 1e-12
 
 
 @extremes.examples(40)
@@ -171,6 +172,15 @@ def test_two_unlike_methods_agree(stack, incidence):
     exact, photons = ask(stack, "adding-doubling", incidence), ask(stack, "monte-carlo", incidence, max_photons=20000)
     for a, b in ((exact["Rd"], photons["Rd"]), (exact.Tt, photons.Tt)):
         assert abs(a - b) <= 4 / 3 * photons.error * max(b, 1e-3) + max(1e-4, exact.error) * a
+
+
+@pytest.mark.parametrize("g", [5e-324, 2.3e-308, 1e-17, -1e-12, 1e-8, -1e-6, 9e-4])
+def test_nearly_isotropic_is_isotropic(g):
+    """Monte Carlo with a g that is next to nothing scatters as with g = 0, photon for photon: Rd within 3 g and 1e-9."""
+    stack = [(0.0, 0.0, 0.0, 2.0, 1.0), (0.1, 1.0, g, 1.0, 0.1)]
+    isotropic = [stack[0], (0.1, 1.0, 0.0, 1.0, 0.1)]
+    a, b = (ask(s, "monte-carlo", max_photons=4096) for s in (stack, isotropic))
+    assert same_within(a["Rd"], b["Rd"], 3 * abs(g), 1e-9)
 
 
 def test_a_thick_slab_is_a_half_space():

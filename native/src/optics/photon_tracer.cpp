@@ -26,13 +26,20 @@ void sample_circle(PhotonRandom& random, double& cosine, double& sine) {
     sine = b * norm;
 }
 
-/// Henyey and Greenstein 1941, inverted as in Witt 1977; `d` is turned in place.
-void scatter(Vector& d, double g, PhotonRandom& random) {
-    double cos_theta = 2 * random.uniform() - 1;
-    if (g != 0) {
-        const double t = (1 - g * g) / (1 + g * cos_theta);
-        cos_theta = (1 + g * g - t * t) / (2 * g);
+/// Cosine of the angle of scattering by Henyey and Greenstein 1941, inverted as in Witt 1977, for `s` uniform in -1..1.
+double scattering_cosine(double g, double s) {
+    if (std::fabs(g) < 1e-3) {
+        // The same multiplied out: the difference below cancels, and for |g| < 1e-16 left nothing but right angles.
+        const double q = 1 / (1 + g * s);
+        return (s + g * (0.5 * (3 + s * s) + g * (s - 0.5 * g * (1 - s * s)))) * q * q;
     }
+    const double t = (1 - g * g) / (1 + g * s);
+    return (1 + g * g - t * t) / (2 * g);
+}
+
+/// `d` is turned in place.
+void scatter(Vector& d, double g, PhotonRandom& random) {
+    const double cos_theta = scattering_cosine(g, 2 * random.uniform() - 1);
     const double sin_theta = std::sqrt(std::fmax(0.0, 1 - cos_theta * cos_theta));
     double cos_phi, sin_phi;
     sample_circle(random, cos_phi, sin_phi);
@@ -148,11 +155,7 @@ void sample_azimuth(PhotonRandom& random, double& cosine, double& sine) {
 
 /// `scatter` with that azimuth.
 void turn(Vector& d, double g, PhotonRandom& random) {
-    double cos_theta = 2 * random.uniform() - 1;
-    if (g != 0) {
-        const double t = (1 - g * g) / (1 + g * cos_theta);
-        cos_theta = (1 + g * g - t * t) / (2 * g);
-    }
+    const double cos_theta = scattering_cosine(g, 2 * random.uniform() - 1);
     const double sin_theta = std::sqrt(positive(1 - cos_theta * cos_theta));
     double u, v;
     sample_azimuth(random, u, v);

@@ -30,7 +30,7 @@ constexpr double bin_error = 0.0013;
 /// Above this absorption of the epidermis (over mu_s'; the most of any skin is 6) R falls too steeply from the bare
 /// dermis to the first nodes of tau to be interpolated: in films thinner than this errors reach 10 % (found on 4,400
 /// stacks against adding-doubling), which no difference between nodes foretells.
-constexpr double film_absorption = 12, film_thickness = 0.05;
+constexpr double film_absorption = 12, film_thickness = 0.1;
 
 /// L1 error of a profile beyond the noise of its rings and the error of its total: the same ring by ring, and the smooth
 /// curve through the rings. Measured on the reference cases, 0.8 % at most.
