@@ -54,7 +54,7 @@ def tables(results: dict[str, Any], brief: bool = False) -> str:
     machine = results["machine"]
     parts = [
         f"Sanguine {results['sanguine']}; {machine['processor']}, {machine['cores']} cores. "
-        "Times: CPU seconds of one thread unless said, the shortest of several repeats. "
+        "Times: CPU seconds of one thread unless said, the median of several repeats. "
         f"One run of {results['minutes']:.1f} minutes; the machine's load at its start was {machine['load']:.1f}"
         + (", quick: few cases and settings.\n" if results["quick"] else ".\n")
     ]

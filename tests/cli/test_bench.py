@@ -65,6 +65,9 @@ def assert_sound(results):
     for row in results["colour"] + results["wavelengths"]:
         assert row["seconds"] > 0 and 0 <= row["delta_e_D65_median"] <= row["delta_e_D65_worst"]
         assert 0 <= row["delta_e_A_median"] <= row["delta_e_A_worst"]
+    # Times are what they seem: more work takes longer.
+    for rows in (results["wavelengths"], [row for row in results["colour"] if row["solver"] == "adding-doubling"]):
+        assert [row["seconds"] for row in rows] == sorted(row["seconds"] for row in rows)
     # More wavelengths, a better colour: 3 are off by what anyone sees, 41 by what nobody can (1 is about visible).
     colours = {row["wavelengths"]: row["delta_e_D65_worst"] for row in results["wavelengths"]}
     assert colours[3] > 1 > 10 * colours[41]
