@@ -11,6 +11,8 @@
 
 #include "sanguine/parallel.hpp"
 
+using VectorIn = nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
+using TableIn = nanobind::ndarray<const double, nanobind::ndim<2>, nanobind::c_contig, nanobind::device::cpu>;
 template <int dimensions> using ArrayOut = nanobind::ndarray<nanobind::numpy, double, nanobind::ndim<dimensions>>;
 using ProgressIn = std::optional<nanobind::callable>;
 
@@ -28,6 +30,9 @@ inline sanguine::Progress with_gil(const ProgressIn& callable) {
         nanobind::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0)
             throw nanobind::python_error();
-        return !callable || nanobind::cast<bool>((*callable)(done, total));
+        bool go_on = true;
+        if (callable && !nanobind::try_cast<bool>((*callable)(done, total), go_on))
+            throw nanobind::type_error("progress: has to return True or False");
+        return go_on;
     };
 }

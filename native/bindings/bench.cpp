@@ -14,16 +14,10 @@ using namespace sanguine;
 
 namespace {
 
-Problem checked(const LayersIn& layers, const std::string& incidence, const std::optional<RadiiIn>& radii_mm) {
+Problem checked(const LayersIn& layers, const std::string& incidence, const std::optional<VectorIn>& radii_mm) {
     Problem problem = problem_of(layers, incidence, radii_mm);
     check_stack(problem.layers);
-    double last = 0;
-    for (const double r : problem.radii_mm) {
-        if (!(r > last && r <= 1e9))
-            throw std::invalid_argument("radii_mm: " + std::to_string(r)
-                                        + " is not above 0, up to 1e9 and above the one before");
-        last = r;
-    }
+    check_radii(problem.radii_mm);
     return problem;
 }
 
@@ -49,7 +43,7 @@ nb::dict py_adding_doubling(const LayersIn& layers, const std::string& incidence
     return answer;
 }
 
-nb::dict py_multipole(const LayersIn& layers, const std::optional<RadiiIn>& radii_mm, int terms) {
+nb::dict py_multipole(const LayersIn& layers, const std::optional<VectorIn>& radii_mm, int terms) {
     const Problem problem = checked(layers, "normal", radii_mm);
     check_range("terms", terms, all_terms, 1000);
     MultipoleResponse total;

@@ -15,8 +15,6 @@ using namespace sanguine;
 
 namespace {
 
-using VectorIn = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using TableIn = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using PriorIn = std::optional<nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>>;
 
 const char* scale_name(FitScale scale) {

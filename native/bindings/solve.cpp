@@ -16,7 +16,7 @@ using namespace sanguine;
 
 namespace {
 
-nb::dict py_solve(const LayersIn& layers, const std::string& incidence, const std::optional<RadiiIn>& radii_mm,
+nb::dict py_solve(const LayersIn& layers, const std::string& incidence, const std::optional<VectorIn>& radii_mm,
                   const std::string& solver, double tolerance, double max_seconds, std::uint64_t max_photons,
                   std::uint64_t seed, int threads, const ProgressIn& progress) {
     const Problem problem = problem_of(layers, incidence, radii_mm);

@@ -11,7 +11,6 @@
 #include "sanguine/solver.hpp"
 
 using LayersIn = nanobind::ndarray<const double, nanobind::shape<-1, 5>, nanobind::c_contig, nanobind::device::cpu>;
-using RadiiIn = nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
 
 inline sanguine::Incidence incidence_of(const std::string& name) {
     if (name == "normal")
@@ -23,7 +22,7 @@ inline sanguine::Incidence incidence_of(const std::string& name) {
 
 /// Not yet checked.
 inline sanguine::Problem problem_of(const LayersIn& layers, const std::string& incidence,
-                                    const std::optional<RadiiIn>& radii_mm) {
+                                    const std::optional<VectorIn>& radii_mm) {
     sanguine::Problem problem;
     problem.incidence = incidence_of(incidence);
     for (std::size_t i = 0; i < layers.shape(0); ++i)

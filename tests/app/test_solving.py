@@ -115,6 +115,8 @@ def test_cancel_and_progress():
     slow = np.array([[1e-6, 100.0, 0.9, 1.4, math.inf]])
     with pytest.raises(sanguine_core.Cancelled):
         sanguine_core.solve(slow, solver="monte-carlo", tolerance=1e-6, progress=lambda done, total: False)
+    with pytest.raises(TypeError, match="progress"):
+        sanguine_core.solve(slow, solver="monte-carlo", tolerance=1e-6, progress=lambda done, total: None)
 
 
 def test_same_answer_on_any_number_of_threads():

@@ -83,7 +83,7 @@ public:
             because += "; Monte Carlo has it to " + percent(s.error_estimate);
         }
         s.because = because;
-        if (s.error_estimate > effort.tolerance && s.warnings.empty())
+        if (s.error_estimate > effort.tolerance)
             s.warnings.push_back("no solver reached the tolerance");
         return s;
     }

@@ -220,7 +220,7 @@ public:
     std::string_view id() const override { return "monte-carlo"; }
 
     std::string_view summary() const override {
-        return "Photons traced until the tolerance is reached: any stack, no approximation, errors known; slow.";
+        return "photons traced until the tolerance is reached: any stack, no approximation, errors known; slow";
     }
 
     std::string unsuited(const Problem& problem) const override {
