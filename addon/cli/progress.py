@@ -27,7 +27,8 @@ def reporter(as_json: bool) -> Iterator[Progress]:
         yield lambda what, done, total: print(f"{what} {done}/{total}", file=sys.stderr, flush=True)
         return
     from rich.console import Console
+    from rich.markup import escape
 
     with Bar(console=Console(stderr=True)) as bar:
         task = bar.add_task("")
-        yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)
+        yield lambda what, done, total: bar.update(task, description=escape(what), completed=done, total=total)

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+from sanguine.cli.progress import reporter
+
 LAYER = {"mu_a": 0.5, "mu_s": 30.0, "g": 0.8, "n": 1.4, "thickness": None}
 
 
@@ -51,3 +53,10 @@ def test_status_2_for_bad_input(tmp_path):
         assert result.returncode == 2 and result.stdout == "", result.stderr
         (line,) = result.stderr.strip().splitlines()
         assert all(word in line for word in words), line
+
+
+def test_ids_are_no_markup(monkeypatch):
+    """A terminal's bar shows them as they are; "[/x]" would end a style that was never begun."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with reporter(as_json=False) as progress:
+        progress("solve [/x]", 0, 1)

@@ -83,8 +83,9 @@ inline constexpr double profile_error_off_ground = 1;
 ///
 /// `error_estimate` is measured, not guessed: the relative difference of Rd or Tt, whichever is larger, from our own
 /// adding-doubling with few streams, a fraction of a millisecond; `profile_error` or `profile_error_off_ground` more
-/// where profiles are asked for, whose difference nothing cheap can measure. It is 1 if adding-doubling has no answer. What is senseless (negative totals, more light out than in, a profile
-/// with 1 % of its light negative) is a SolverError; what is merely wrong is a warning with its size.
+/// where profiles are asked for, whose difference nothing cheap can measure. It is 1 if adding-doubling has no answer.
+/// What is senseless (negative totals, more light out than in, a profile with 1 % of its light negative) is a
+/// SolverError; what is merely wrong is a warning with its size.
 class Multipole final : public Solver {
 public:
     std::string_view id() const override { return "multipole"; }

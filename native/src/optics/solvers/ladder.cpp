@@ -141,7 +141,8 @@ void check_radii(std::span<const double> radii_mm) {
     double last = 0;
     for (const double r : radii_mm) {
         if (!(r > last && std::isfinite(r)))
-            throw std::invalid_argument(message("radii_mm: ", r, " is not above 0, finite and above the one before"));
+            throw std::invalid_argument(
+                message("radii_mm: ", r, " is not above 0, finite and above the one before"));
         last = r;
     }
 }

@@ -227,7 +227,8 @@ public:
         const Layer& last = problem.layers.back();
         const double rate = last.mu_a + last.mu_s;
         if (std::isinf(last.thickness) && rate > 0 && rate < least_rate_per_mm)
-            return message("layers.", problem.layers.size() - 1, ": a free path of ", 1 / rate, " mm is no number to count with");
+            return message("layers.", problem.layers.size() - 1, ": mu_a + mu_s is ", rate, ", whose free path is beyond ",
+                           "the range of a number; at least ", least_rate_per_mm, " or 0");
         return "";
     }
 
@@ -288,8 +289,9 @@ Solution MonteCarlo::solve(const Problem& problem, const Effort& effort) const {
         top = radial_density(rings, t.R_rings, radii);
         if (has_bottom)
             bottom = radial_density(rings, t.T_rings, radii);
-        totals_error = effort.profile_alone ? 0 : std::fmax(relative_error(t.Rd), has_bottom ? relative_error(t.Tt) : 0);
-        profile_error = 0;
+        totals_error = profile_error = 0;
+        if (!effort.profile_alone)
+            totals_error = std::fmax(relative_error(t.Rd), has_bottom ? relative_error(t.Tt) : 0);
         if (!radii.empty())
             profile_error = std::fmax(relative_noise(top, scatters, t.photons),
                                       has_bottom ? relative_noise(bottom, scatters, t.photons) : 0);
