@@ -13,6 +13,9 @@ from ..domain.files import read_json
 from ..domain.lut import LOBES
 from ..domain.parameters import skin_from, skin_rows
 
+# Numbers of one answer: more would take gigabytes as JSON.
+MAX_VALUES = 20_000_000
+
 _WORKING_SPACE = "rec709"  # the contract names these outputs by it
 
 
@@ -42,9 +45,16 @@ def report(ids: list[str], skins: list[dict[str, float]], wavelengths_nm: np.nda
 
     Everything but `surface_reflectance` is light that went through the skin: what the oil film reflects on
     average, E, is taken from it once, so `reflectance` is (1 - E) of the bare skin's.
+
+    Raises InputError for more than MAX_VALUES numbers.
     """
     if not skins:
         return {"sanguine": sanguine_core.__version__, "results": []}
+    if (total := len(skins) * len(wavelengths_nm)) > MAX_VALUES:
+        raise InputError(
+            f"--wavelengths: {len(wavelengths_nm)} of them for {len(skins)} skins are {total} numbers, at most"
+            f" {MAX_VALUES} are allowed: ask for fewer at once"
+        )
     rows = skin_rows(skins)
     film, surface = sanguine_core.surface(rows).T
     under_film = 1.0 - film

@@ -61,6 +61,11 @@ def test_bad_wavelengths(tmp_path, text):
     assert_one_line(skin(tmp_path, SKIN, "--wavelengths", text), "--wavelengths", text)
 
 
+def test_more_numbers_than_memory(tmp_path):
+    many = {"skins": [{}] * 300}
+    assert_one_line(skin(tmp_path, many, "--wavelengths", "380:780:0.005"), "--wavelengths", "300 skins", "at most")
+
+
 def test_missing_file(tmp_path):
     assert_one_line(run("skin", tmp_path / "none.json"), "none.json", "no such file")
 
