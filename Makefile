@@ -106,11 +106,12 @@ $(OIIO_STAMP): | $(BUILD_STAMP)
 	@touch $@
 
 # auditwheel copies the image libraries into the wheel under hashed names, so
-# that they never meet Blender's own.
+# that they never meet Blender's own. It fails if the wheel asks for more than
+# glibc 2.34 (std::hypot would: 2.35), which render farms on RHEL 9 have.
 $(NATIVE_STAMP): $(NATIVE_SOURCES) $(BUILD_STAMP) $(OIIO_STAMP)
 	rm -rf build/raw dist/wheels/sanguine_core-*
 	$(PY) -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir build/raw .
-	LD_LIBRARY_PATH=$(CURDIR)/$(OIIO)/lib auditwheel repair --wheel-dir dist/wheels build/raw/*.whl
+	LD_LIBRARY_PATH=$(CURDIR)/$(OIIO)/lib auditwheel repair --plat manylinux_2_34_x86_64 --wheel-dir dist/wheels build/raw/*.whl
 	$(PIP) --no-deps --force-reinstall dist/wheels/sanguine_core-*.whl
 	@touch $@
 

@@ -140,11 +140,12 @@ Colour lab_from_xyz(const Colour& xyz, Illuminant illuminant) {
 double delta_e_2000(const Colour& lab_1, const Colour& lab_2) {
     constexpr double degree = std::numbers::pi / 180;
     const auto power7 = [](double x) { return std::pow(x, 7); };
+    const auto length = [](double a, double b) { return std::sqrt(a * a + b * b); };
     const double pale = power7(25);
-    const double mean_chroma = (std::hypot(lab_1[1], lab_1[2]) + std::hypot(lab_2[1], lab_2[2])) / 2;  // Eq. 3
+    const double mean_chroma = (length(lab_1[1], lab_1[2]) + length(lab_2[1], lab_2[2])) / 2;  // Eq. 3
     const double stretch = 1.5 - 0.5 * std::sqrt(power7(mean_chroma) / (power7(mean_chroma) + pale));  // 1 + G, Eq. 4
     const double a1 = stretch * lab_1[1], a2 = stretch * lab_2[1], b1 = lab_1[2], b2 = lab_2[2];
-    const double c1 = std::hypot(a1, b1), c2 = std::hypot(a2, b2);
+    const double c1 = length(a1, b1), c2 = length(a2, b2);
     const auto hue = [](double a, double b) {  // 0 to 360 degrees, 0 for grey, Eq. 7
         const double h = std::atan2(b, a) / degree;
         return h < 0 ? h + 360 : h;

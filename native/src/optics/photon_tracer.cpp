@@ -124,7 +124,7 @@ PhotonEnd trace_photon(std::span<const Layer> stack, Incidence incidence, Photon
             }
             if (outermost) {
                 end.fate = down ? Fate::left_bottom : Fate::left_top;
-                end.radius = std::hypot(x, y);
+                end.radius = std::sqrt(x * x + y * y);
                 return end;
             }
             layer += down ? 1 : -1;

@@ -129,7 +129,7 @@ MultipoleResponse MultipoleLayer::closed_form(double gamma) const {
 }
 
 MultipoleResponse MultipoleLayer::operator()(double s) const {
-    const double gamma = std::hypot(s, sigma_tr);
+    const double gamma = std::sqrt(s * s + sigma_tr * sigma_tr);
     if (thickness == half_space)
         return {0.5 * reduced_albedo * std::exp(-gamma * source_depth) * (1 + std::exp(-2 * gamma * zb_top)), 0, 0, 0};
     if (terms_ == all_terms)
