@@ -7,21 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "sanguine/path_table.hpp"
 #include "sanguine/surface.hpp"
 
 namespace sanguine {
 namespace {
-
-/// What the exception says, "" without one.
-template <class Function> std::string message_of(Function&& function) {
-    try {
-        function();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
 
 std::vector<double> default_row() {
     std::vector<double> row;

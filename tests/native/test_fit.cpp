@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "sanguine/fresnel.hpp"
 #include "sanguine/skin.hpp"
 
@@ -31,15 +32,6 @@ std::vector<double> seen(const SkinParameters& skin, double surface, const std::
     for (double& value : r)
         value = surface + (1 - surface) / (1 - diffuse_fresnel(1.4)) * value;
     return r;
-}
-
-template <class Function> std::string message_of(Function&& function) {
-    try {
-        function();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
 }
 
 TEST(Fit, RowsAreOfTheSchemaAndInsideIt) {

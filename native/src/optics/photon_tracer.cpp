@@ -37,17 +37,11 @@ double scattering_cosine(double g, double s) {
     return (1 + g * g - t * t) / (2 * g);
 }
 
-/// `d` is turned in place.
-void scatter(Vector& d, double g, PhotonRandom& random) {
-    const double cos_theta = scattering_cosine(g, 2 * random.uniform() - 1);
-    const double sin_theta = std::sqrt(std::fmax(0.0, 1 - cos_theta * cos_theta));
-    double cos_phi, sin_phi;
-    sample_circle(random, cos_phi, sin_phi);
-
+/// Turns `d` to (u, v, cos_theta) of a frame whose third axis it is.
+void turn_to(Vector& d, double u, double v, double cos_theta) {
     // Orthonormal basis around d without a branch at the pole (Duff et al. 2017, JCGT 6(1)).
     const double sign = std::copysign(1.0, d.z);
     const double a = -1 / (sign + d.z), b = d.x * d.y * a;
-    const double u = sin_theta * cos_phi, v = sin_theta * sin_phi;
     const Vector turned = {
         u * (1 + sign * d.x * d.x * a) + v * b + cos_theta * d.x,
         u * sign * b + v * (sign + d.y * d.y * a) + cos_theta * d.y,
@@ -56,6 +50,16 @@ void scatter(Vector& d, double g, PhotonRandom& random) {
     // One Newton step keeps the length at 1 over thousands of turns.
     const double scale = 1.5 - 0.5 * (turned.x * turned.x + turned.y * turned.y + turned.z * turned.z);
     d = {turned.x * scale, turned.y * scale, turned.z * scale};
+}
+
+/// `d` is turned in place.
+void scatter(Vector& d, double g, PhotonRandom& random) {
+    const double cos_theta = scattering_cosine(g, 2 * random.uniform() - 1);
+    const double sin_theta = std::sqrt(std::fmax(0.0, 1 - cos_theta * cos_theta));
+    double cos_phi, sin_phi;
+    sample_circle(random, cos_phi, sin_phi);
+
+    turn_to(d, sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
 }
 
 /// Direction after refraction from index n_i into n_t with the cosine that Fresnel's law gave.
@@ -161,16 +165,7 @@ void turn(Vector& d, double g, PhotonRandom& random) {
     sample_azimuth(random, u, v);
     u *= sin_theta;
     v *= sin_theta;
-
-    const double sign = std::copysign(1.0, d.z);
-    const double c = -1 / (sign + d.z), e = d.x * d.y * c;
-    const Vector turned = {
-        u * (1 + sign * d.x * d.x * c) + v * e + cos_theta * d.x,
-        u * sign * e + v * (sign + d.y * d.y * c) + cos_theta * d.y,
-        -u * sign * d.x - v * d.y + cos_theta * d.z,
-    };
-    const double unit = 1.5 - 0.5 * (turned.x * turned.x + turned.y * turned.y + turned.z * turned.z);
-    d = {turned.x * unit, turned.y * unit, turned.z * unit};
+    turn_to(d, u, v, cos_theta);
 }
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
