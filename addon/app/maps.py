@@ -20,10 +20,11 @@ _PADDING = 16
 class Surface:
     """A face as the maps need it.
 
-    uv: (L, 2) float32 per face corner. triangles: (T, 3) int32 into corners. corner_vertex: (L,) int32.
-    regions: region id -> (V,) float32 mask, 0-1, in the order of the vertices.
+    position_mm: (V, 3) float32, of the neutral face. uv: (L, 2) float32 per face corner. triangles: (T, 3) int32 into
+    corners. corner_vertex: (L,) int32. regions: region id -> (V,) float32 mask, 0-1, in the order of the vertices.
     """
 
+    position_mm: np.ndarray
     uv: np.ndarray
     triangles: np.ndarray
     corner_vertex: np.ndarray

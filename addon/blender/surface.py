@@ -37,11 +37,17 @@ def face_regions(obj: bpy.types.Object) -> tuple[str, ...]:
 def store_rest(obj: bpy.types.Object) -> None:
     """Writes the neutral positions, in mm, as a vertex attribute."""
     mesh = obj.data
-    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
     attribute = mesh.attributes.get(REST_ATTRIBUTE) or mesh.attributes.new(REST_ATTRIBUTE, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", _position_mm(obj).ravel())
+
+
+def _position_mm(obj: bpy.types.Object) -> np.ndarray:
+    """(V, 3) float32: the neutral face at the object's scale, in mm."""
+    positions = np.empty(len(obj.data.vertices) * 3, dtype=np.float32)
+    obj.data.vertices.foreach_get("co", positions)
     mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
-    attribute.data.foreach_set("vector", positions * mm_per_unit)
+    scale = np.array(obj.matrix_world.to_scale(), dtype=np.float32)
+    return positions.reshape(-1, 3) * (mm_per_unit * scale)
 
 
 def read_surface(obj: bpy.types.Object) -> Surface:
@@ -58,7 +64,7 @@ def read_surface(obj: bpy.types.Object) -> Surface:
     triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("loops", triangles)
     regions = {region: _weights(obj, region) for region in face_regions(obj)}
-    return Surface(uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions)
+    return Surface(_position_mm(obj), uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions)
 
 
 def _weights(obj: bpy.types.Object, region: str) -> np.ndarray:

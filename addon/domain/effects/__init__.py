@@ -1,7 +1,7 @@
 """The effects, each declared in its module and listed here once, in the order in which they act."""
 
 from . import anatomy, mottle, oil, oxygenation, perfusion, relief, scattering
-from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scene, ShaderInput
+from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
 EFFECTS: tuple[Effect, ...] = (
     scattering.EFFECT,
@@ -13,4 +13,4 @@ EFFECTS: tuple[Effect, ...] = (
     oil.EFFECT,
 )
 
-__all__ = ["EFFECTS", "ELSEWHERE", "Activation", "Bounds", "Effect", "Fragment", "Frame", "Scene", "ShaderInput"]
+__all__ = ["EFFECTS", "ELSEWHERE", "Activation", "Bounds", "Effect", "Fragment", "Frame", "Growth", "Scene", "ShaderInput"]

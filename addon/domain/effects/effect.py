@@ -30,6 +30,16 @@ class Frame:
 
 
 @dataclass(frozen=True)
+class Growth:
+    """Whose features grow, and which individual's. See `sanguine/feature.hpp` for the ranges."""
+
+    seed: int = 0
+    age_years: float = 30.0
+    sun: float = 0.5
+    masculinity: float = 0.0
+
+
+@dataclass(frozen=True)
 class Scene:
     """All that the planner may look at."""
 
@@ -39,6 +49,7 @@ class Scene:
     strengths: Mapping[str, float] = field(default_factory=dict)
     # Regions whose masks the face has. A face without masks has none.
     regions: tuple[str, ...] = ()
+    growth: Growth = Growth()
     # True while an artist works: every control may still move, so axes span what sliders reach.
     live: bool = False
 
