@@ -255,6 +255,7 @@ def denoise_cost(material: Material, pixels: int = 320, repeats: int = 3) -> flo
 
 def face_costs(settings: list[Settings], plan_of: Callable[[Settings], Plan], repeats: int = 2) -> list[float]:
     """Core seconds for table and maps of a plan on the example head, per settings, the least of `repeats`."""
+    from sanguine.app.map_cache import MapCache
     from sanguine.app.maps import bake_maps
     from sanguine.blender.face import add_face
     from sanguine.blender.surface import read_surface
@@ -268,7 +269,7 @@ def face_costs(settings: list[Settings], plan_of: Callable[[Settings], Plan], re
             plan = plan_of(each)
             start = time.process_time()
             bake(plan.axes, plan.scene.skin, "rec709", lobes=each.lobes)
-            bake_maps(plan.maps, surface, each.map_size)
+            bake_maps(plan, surface, each.map_size, MapCache(None))
             found[k] = min(found[k], time.process_time() - start)
     return found
 

@@ -1,19 +1,36 @@
-"""Maps of a face from the masks of its regions: where blood may move, and how the skin differs by anatomy."""
+"""Maps of a face: where blood may move, how the skin differs by anatomy, and what grows on it.
+
+Only what a plan asks for is made, at the size asked for, for the UV tiles that the face has; and of that only what no
+cache holds: a layer is kept by the face, the feature and the person, so a change of one strength paints nothing anew.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
 
 import numpy as np
 import sanguine_core
 
 from ..domain.blood import ANATOMY, Rest
-from ..domain.effects import anatomy
+from ..domain.effects import Growth, anatomy
 from ..domain.effects.regions import region_images
+from ..domain.plan import Plan
+from ..domain.udim import FIRST_TILE, tile_offset, tiles_of
+from .map_cache import MapCache, key_of
 
 # Texels that repeat a UV island's edge outward, so that filtering never meets the background.
 _PADDING = 16
+
+GROWN = {
+    "grown": ("log_hemoglobin", "log_melanin", "log_oil", "oxygenation"),
+    "grown_ink": ("ink_per_mm",),
+    "grown_height": ("height_mm",),
+}
+"""Map id -> what its channels hold: sums over the features' layers."""
+
+Progress = Callable[[int, int], bool]
 
 
 @dataclass(frozen=True)
@@ -30,34 +47,129 @@ class Surface:
     corner_vertex: np.ndarray
     regions: Mapping[str, np.ndarray]
 
+    @cached_property
+    def region_weights(self) -> np.ndarray:
+        """(V, R) float32, columns in the order of `regions`."""
+        columns = [np.asarray(mask, dtype=np.float32) for mask in self.regions.values()]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.position_mm), 0), dtype=np.float32)
 
-def bake_maps(wanted: tuple[str, ...], surface: Surface, size: int) -> dict[str, np.ndarray]:
-    """The maps of a plan. Returns map id -> (size, size, 3 or 4) float32, row 0 lowest; nothing unasked for."""
-    if not wanted:
-        return {}
-    names = tuple(surface.regions)
-    weights = np.stack([surface.regions[name] for name in names], axis=1).astype(np.float32)
-    masks = sanguine_core.rasterize_uv(
-        surface.uv, surface.triangles, weights[surface.corner_vertex], size, size, _PADDING,
-        np.zeros(len(names), dtype=np.float32),
-    )
-    made = {}
-    images = region_images(names)
-    for name in wanted:
-        if name == anatomy.MAP:
-            made[name] = _anatomy(masks, names)
-        else:
-            made[name] = _channels(masks, [names.index(region) for region in images[name]])
+    @cached_property
+    def digest(self) -> str:
+        return key_of(
+            self.position_mm, self.uv, self.triangles, self.corner_vertex, list(self.regions), self.region_weights
+        )
+
+    @cached_property
+    def tiles(self) -> tuple[int, ...]:
+        """Numbers of the UDIM tiles that the layout uses, (1001,) for an ordinary one."""
+        return tiles_of(self.uv[self.triangles])
+
+    def at_tile(self, tile: int) -> Surface:
+        """The same face with `tile` moved into the unit square."""
+        if tile == FIRST_TILE:
+            return self
+        offset = np.array(tile_offset(tile), dtype=np.float32)
+        return Surface(self.position_mm, self.uv - offset, self.triangles, self.corner_vertex, self.regions)
+
+
+class Grown:
+    """Layers of features on one UV tile of a face; what no cache holds is grown and painted when asked for."""
+
+    def __init__(self, surface: Surface, growth: Growth, size: int, cache: MapCache, progress: Progress | None = None):
+        self.surface, self.growth, self.size, self.cache, self.progress = surface, growth, size, cache, progress
+        self.key = key_of(surface.digest, asdict(growth), size, _PADDING)
+
+    @cached_property
+    def _native(self) -> sanguine_core.SkinSurface:
+        face = self.surface
+        return sanguine_core.SkinSurface(
+            face.position_mm, face.uv, face.triangles, face.corner_vertex, list(face.regions), face.region_weights
+        )
+
+    @cached_property
+    def _texels(self) -> sanguine_core.TexelMap:
+        return self._native.texels(self.size, self.size, _PADDING)
+
+    @cached_property
+    def texel(self) -> np.ndarray:
+        """(N,) uint32: row * size + column of the texels that the layers have values for."""
+        return self.cache.get(key_of(self.key, "texel"), lambda: np.asarray(self._texels.texel))
+
+    def layer(self, feature: str) -> np.ndarray:
+        """(N, C) float16, channels in the order of the feature's row. Half is what the material's maps hold too."""
+
+        def paint() -> np.ndarray:
+            growth = self.growth
+            return sanguine_core.grow(
+                feature, self._native, self._texels, growth.seed, growth.age_years, growth.sun, growth.masculinity,
+                progress=self.progress,
+            ).astype(np.float16)
+
+        return self.cache.get(key_of(self.key, feature), paint)
+
+    def compose(self, strengths: Mapping[str, float], channels: tuple[str, ...]) -> np.ndarray:
+        """(size, size, C) float32: the sum of strength x layer; 0 where there is no skin."""
+        total = np.zeros((len(self.texel), len(channels)), dtype=np.float32)
+        for row in sanguine_core.features():
+            held = [change["channel"] for change in row["changes"]]
+            if strengths.get(row["id"], 0.0) <= 0.0 or not set(held) & set(channels):
+                continue
+            layer = self.layer(row["id"])
+            for i, channel in enumerate(held):
+                if channel in channels:
+                    total[:, channels.index(channel)] += np.float32(strengths[row["id"]]) * layer[:, i]
+        image = np.zeros((self.size * self.size, len(channels)), dtype=np.float32)
+        image[self.texel] = total
+        return image.reshape(self.size, self.size, len(channels))
+
+
+def bake_maps(
+    plan: Plan, surface: Surface, size: int, cache: MapCache | None = None, progress: Progress | None = None
+) -> dict[str, dict[int, np.ndarray]]:
+    """The maps that a plan makes from the face itself; nothing unasked for.
+
+    Returns map id -> UDIM tile -> (size, size, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`,
+    called with what is done and what there is to do, answers False.
+    """
+    cache = cache or MapCache()
+    made: dict[str, dict[int, np.ndarray]] = {}
+    for tile in surface.tiles if plan.maps else ():
+        layers = Grown(surface.at_tile(tile), plan.scene.growth, size, cache, progress)
+        for name in plan.maps:
+            if (image := _bake(name, plan, layers)) is not None:
+                made.setdefault(name, {})[tile] = image
     return made
 
 
-def _channels(masks: np.ndarray, columns: list[int]) -> np.ndarray:
-    image = np.zeros((*masks.shape[:2], 3), dtype=np.float32)
-    image[..., : len(columns)] = masks[..., columns]
-    return image
+def _bake(name: str, plan: Plan, layers: Grown) -> np.ndarray | None:
+    face, size, cache = layers.surface, layers.size, layers.cache
+    images = region_images(tuple(face.regions))
+    if name in images:
+        return cache.get(key_of(face.digest, name, size, _PADDING), lambda: _masks(face, size, images[name]))
+    if name == anatomy.MAP:
+        rest = {region: asdict(ANATOMY[region]) for region in face.regions if region in ANATOMY}
+        return cache.get(key_of(face.digest, name, size, _PADDING, rest), lambda: _anatomy(face, size))
+    if name in GROWN:
+        strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
+        return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, GROWN[name]))
+    return None
 
 
-def _anatomy(masks: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    rest = [ANATOMY.get(name, Rest()) for name in names]
+def _masks(face: Surface, size: int, regions: tuple[str, ...]) -> np.ndarray:
+    """Masks of at most three regions, (size, size, 3)."""
+    columns = np.zeros((len(face.position_mm), 3), dtype=np.float32)
+    for i, region in enumerate(regions):
+        columns[:, i] = face.regions[region]
+    return _draw(face, size, columns, np.zeros(3, dtype=np.float32))
+
+
+def _anatomy(face: Surface, size: int) -> np.ndarray:
+    rest = [ANATOMY.get(region, Rest()) for region in face.regions]
     table = np.array([[r.hemoglobin - 1.0, r.melanin - 1.0, r.oil - 1.0, r.oxygenation] for r in rest], dtype=np.float32)
-    return masks @ table + np.array([1.0, 1.0, 1.0, 0.0], dtype=np.float32)
+    neutral = np.array([1.0, 1.0, 1.0, 0.0], dtype=np.float32)
+    return _draw(face, size, face.region_weights @ table + neutral, neutral)
+
+
+def _draw(face: Surface, size: int, per_vertex: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    values = np.ascontiguousarray(per_vertex[face.corner_vertex], dtype=np.float32)
+    return sanguine_core.rasterize_uv(face.uv, face.triangles, values, size, size, _PADDING, neutral)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import bpy
+import numpy as np
 
-from ..app.maps import bake_maps
+from ..app.maps import Surface, bake_maps
 from ..domain.blood import BLOOD_CHANNELS
 from ..domain.plan import Plan
+from ..domain.texel_density import map_size, mm_per_uv
+from ..domain.udim import FIRST_TILE
 from .controls import drive_blood
 from .material import MARK, build_skin_material, remove_skin_material
-from .surface import read_surface, store_rest
+from .surface import pixel_mm, read_surface, store_rest
 
 
 def apply_skin(
@@ -22,7 +25,7 @@ def apply_skin(
     progress: Callable[[int, int], bool] | None = None,
 ) -> bpy.types.Material:
     """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`."""
-    maps = bake_maps(plan.maps, read_surface(face), plan.settings.map_size) if plan.maps else {}
+    maps = _bake(face, plan, progress) if plan.maps else {}
     before = face.material_slots[slot].material if face.material_slots else None
     if before is not None and MARK in before and before.users == 1:
         remove_skin_material(before)
@@ -37,6 +40,21 @@ def apply_skin(
     if armature is not None:
         drive_blood(armature, face, [c for c in BLOOD_CHANNELS.values() if c.property_name in inputs])
     return material
+
+
+def _bake(
+    face: bpy.types.Object, plan: Plan, progress: Callable[[int, int], bool] | None
+) -> dict[str, np.ndarray | dict[int, np.ndarray]]:
+    """Map id -> image, or images by UDIM tile where the layout has more than the first."""
+    surface = read_surface(face)
+    tiles = bake_maps(plan, surface, needed_map_size(face, surface, plan), progress=progress)
+    return {name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()}
+
+
+def needed_map_size(face: bpy.types.Object, surface: Surface, plan: Plan) -> int:
+    """Texels along a side: what the scene's camera can tell apart, at most what the quality allows."""
+    span_mm = mm_per_uv(surface.position_mm, surface.uv, surface.triangles, surface.corner_vertex)
+    return map_size(span_mm, pixel_mm(bpy.context.scene, face), plan.settings.map_size)
 
 
 def skin_slot(face: bpy.types.Object) -> int:

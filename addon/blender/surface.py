@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ..app.maps import Surface
 from ..domain.effects.regions import FACE_REGIONS
@@ -48,6 +49,26 @@ def _position_mm(obj: bpy.types.Object) -> np.ndarray:
     mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
     scale = np.array(obj.matrix_world.to_scale(), dtype=np.float32)
     return positions.reshape(-1, 3) * (mm_per_unit * scale)
+
+
+def pixel_mm(scene: bpy.types.Scene, obj: bpy.types.Object) -> float | None:
+    """What a pixel of the scene's camera covers where `obj` is nearest to it, in mm of its surface.
+
+    None without a camera, or when it sees none of the object from outside.
+    """
+    camera = scene.camera
+    if camera is None or camera.data.type == "PANO":
+        return None
+    seen = camera.matrix_world.inverted() @ obj.matrix_world
+    corner = camera.data.view_frame(scene=scene)  # in the camera's own space, at depth -z for a perspective
+    width = max(point.x for point in corner) - min(point.x for point in corner)
+    if camera.data.type == "PERSP":
+        depth = min(-(seen @ Vector(place)).z for place in obj.bound_box)
+        if depth <= camera.data.clip_start:
+            return None
+        width *= depth / -corner[0].z
+    pixels = scene.render.resolution_x * scene.render.resolution_percentage / 100.0
+    return 1000.0 * scene.unit_settings.scale_length * width / pixels
 
 
 def read_surface(obj: bpy.types.Object) -> Surface:

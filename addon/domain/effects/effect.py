@@ -49,9 +49,9 @@ class Scene:
     strengths: Mapping[str, float] = field(default_factory=dict)
     # Regions whose masks the face has. A face without masks has none.
     regions: tuple[str, ...] = ()
-    growth: Growth = Growth()
     # True while an artist works: every control may still move, so axes span what sliders reach.
     live: bool = False
+    growth: Growth = Growth()
 
 
 @dataclass(frozen=True)

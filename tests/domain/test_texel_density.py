@@ -1,0 +1,46 @@
+"""Maps have as many texels as the camera can tell apart, and no more."""
+
+import numpy as np
+import pytest
+from sanguine.domain.texel_density import SMALLEST_SIZE, map_size, mm_per_uv
+
+# Two triangles: a square of 1 in UV, or of whatever `square` is given, over 200 x 200 mm.
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+CORNER_VERTEX = np.arange(4, dtype=np.int32)
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
+
+
+def span(uv_side=1.0, side_mm=200.0):
+    position_mm = np.c_[SQUARE * side_mm, np.zeros(4)].astype(np.float32)
+    return mm_per_uv(position_mm, SQUARE * uv_side, TRIANGLES, CORNER_VERTEX)
+
+
+def test_a_layout_that_fills_the_tile_spans_its_own_width():
+    assert span() == pytest.approx(200.0)
+
+
+def test_half_the_tile_means_twice_the_millimetres():
+    assert span(uv_side=0.5) == pytest.approx(400.0)
+
+
+def test_meshes_without_area_span_nothing():
+    assert span(uv_side=0.0) == 0.0
+    assert span(side_mm=0.0) == 0.0
+
+
+def test_a_crammed_tenth_does_not_decide():
+    """A small triangle squeezed in UV would ask for a hundred times the texels everywhere."""
+    position_mm = np.c_[SQUARE * 200, np.zeros(4)].astype(np.float32)
+    position_mm = np.concatenate([position_mm, position_mm[:3] * 0.1])
+    uv = np.concatenate([SQUARE, SQUARE[:3] * 0.001])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]], dtype=np.int32)
+    assert mm_per_uv(position_mm, uv, triangles, np.arange(7, dtype=np.int32)) == pytest.approx(200.0)
+
+
+def test_one_texel_per_pixel_in_powers_of_two():
+    assert map_size(200.0, 0.2, 4096) == 1024  # 1000 texels
+    assert map_size(200.0, 0.19, 4096) == 2048
+    assert map_size(200.0, 0.01, 4096) == 4096  # the quality's own bound
+    assert map_size(200.0, 50.0, 4096) == SMALLEST_SIZE
+    assert map_size(200.0, None, 2048) == 2048  # no camera is known
+    assert map_size(0.0, 1.0, 32) == 32
