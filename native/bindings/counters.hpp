@@ -16,10 +16,12 @@ struct Counters {
     Counter lobe_fits{"lobe_fits"};                  ///< fits: skins x channels
     Counter stack_solves{"stack_solves"};            ///< layered stacks, whatever the solver
     Counter texels_rasterized{"texels_rasterized"};  ///< pixels of drawn maps, each channel once
+    Counter texels_painted{"texels_painted"};        ///< places of maps, each feature once
     Counter spectra_fitted{"spectra_fitted"};        ///< measured spectra
 
-    std::array<Counter*, 6> all() {
-        return {&spectral_solves, &profile_solves, &lobe_fits, &stack_solves, &texels_rasterized, &spectra_fitted};
+    std::array<Counter*, 7> all() {
+        return {&spectral_solves,   &profile_solves, &lobe_fits,     &stack_solves,
+                &texels_rasterized, &texels_painted, &spectra_fitted};
     }
 };
 

@@ -7,6 +7,7 @@ namespace nb = nanobind;
 
 void bind_bench(nb::module_& m);
 void bind_fit(nb::module_& m);
+void bind_mesh(nb::module_& m);
 void bind_optics(nb::module_& m);
 void bind_solve(nb::module_& m);
 void bind_texture(nb::module_& m);
@@ -19,6 +20,7 @@ NB_MODULE(_core, m) {
     bind_solve(m);
     bind_bench(m);
     bind_texture(m);
+    bind_mesh(m);
     m.def(
         "counters",
         [] {

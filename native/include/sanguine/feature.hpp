@@ -56,7 +56,7 @@ struct Person {
 struct SkinPlace {
     glm::vec3 place_mm;
     glm::vec3 normal;  ///< unit; tells a place from one that touches it from the other side (lips, nostrils)
-    float size_mm;     ///< side of the texel: what is finer is to fade into its mean, not to alias
+    float size_mm;     ///< side of the texel, the same across a seam: what is finer is to fade into its mean
     SurfacePoint point;
 };
 
@@ -89,11 +89,17 @@ struct TexelMap {
     int width, height;
     std::vector<std::uint32_t> texel;  ///< row * width + column, row 0 is V = 0; ascending
     std::vector<SkinPlace> place;      ///< of each of them
+    std::size_t triangles;             ///< of the surface, to tell that of another one
 };
 TexelMap map_texels(const SkinSurface& surface, int width, int height, int padding_px, int threads);
 
 /// One feature over all texels of a map: [texel of the map][channel of the feature's row].
 std::vector<float> paint_layer(const GrownFeature& grown, const FeatureRow& row, const TexelMap& texels, int threads,
                                const Progress& progress);
+
+/// Grows a feature and paints it. Throws std::invalid_argument for a person outside of the ranges and for the texels
+/// of another surface.
+std::vector<float> grow_layer(const Feature& feature, const SkinSurface& surface, const TexelMap& texels,
+                              const Person& person, std::uint64_t seed, int threads, const Progress& progress);
 
 }  // namespace sanguine

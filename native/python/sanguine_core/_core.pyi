@@ -214,6 +214,101 @@ def contact_sheet(paths: Sequence[str | os.PathLike], captions: Sequence[str], o
     8-bit values are copied unchanged. `background` is 0 to 1 in the pictures' encoding. Raises ImageError.
     """
 
+class TexelMap:
+    """
+    The texels of a UV layout that show skin, N of them.
+
+    Arrays are views of the map, read-only.
+    """
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def height(self) -> int: ...
+
+    @property
+    def texel(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+        """
+        (N,) uint32: row * width + column, row 0 being the bottom row (V = 0); ascending.
+        """
+
+    @property
+    def place_mm(self) -> Annotated[NDArray[numpy.float32], dict(shape=(None, 3), writable=False)]:
+        """(N, 3) float32."""
+
+    @property
+    def size_mm(self) -> Annotated[NDArray[numpy.float32], dict(shape=(None,), writable=False)]:
+        """(N,) float32: side of the square of skin that a texel shows."""
+
+    @property
+    def triangle(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+        """(N,) uint32: the triangle that a texel shows."""
+
+    @property
+    def barycentric(self) -> Annotated[NDArray[numpy.float32], dict(shape=(None, 3), writable=False)]:
+        """(N, 3) float32: where in the triangle, by its corners."""
+
+class SkinSurface:
+    """
+    The skin of a face as features grow on it; immutable.
+
+    Parameters
+    ----------
+    position_mm : (V, 3) float32, the neutral face; Z up, it looks along -Y
+    uv : (L, 2) float32, one per corner (loop)
+    triangles : (T, 3) int32, indices of corners
+    corner_vertex : (L,) int32, the vertex of each corner
+    region_names : R ids of rigs/regions.toml
+    region_weights : (V, R) float32, 0 to 1
+
+    Notes
+    -----
+    Vertices at the same place count as one. Raises ValueError for indices that do not exist, values that are not finite,
+    weights outside 0 to 1 and a mesh without area.
+    """
+
+    def __init__(self, position_mm: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], corner_vertex: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], region_names: Sequence[str], region_weights: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
+
+    @property
+    def area_mm2(self) -> float: ...
+
+    def texels(self, width: int, height: int, padding_px: int, threads: int = 0) -> TexelMap:
+        """
+        The texels that show skin or lie within `padding_px` of it (with the nearest place of the skin).
+
+        `width` and `height` are allowed from 1 to 16384; `threads` = 0 uses every core and changes nothing in the result.
+        """
+
+def features() -> list:
+    """
+    Every feature that grows on a face: dicts with id, label, help, source and changes.
+
+    `changes` are the columns of its layer, dicts with channel (log_hemoglobin, log_melanin, log_oil: natural logarithms
+    of a factor; oxygenation, ink_per_mm, height_mm: sums), low and high: the range that the layer stays in.
+    """
+
+def grow(feature_id: str, surface: SkinSurface, texels: TexelMap, seed: int, age_years: float, sun: float, masculinity: float, threads: int = 0, progress: Callable | None = None) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+    """
+    Grow one feature and paint it on the texels.
+
+    Parameters
+    ----------
+    feature_id : an id of features()
+    surface : SkinSurface, the one that `texels` is of
+    texels : TexelMap
+    seed : 0 to 2^64 - 1; with equal arguments the result has the same bytes
+    age_years : 0 to 120
+    sun : exposure, 0 none to 1 a life outdoors
+    masculinity : 0 female to 1 male
+    threads : 0 uses every core; the result does not depend on it
+    progress : called with (done, total) on this thread a few times a second; False raises Cancelled
+
+    Returns
+    -------
+    (N, C) float32: a row for each texel of `texels.texel`, a column for each of the feature's changes.
+    """
+
 def counters() -> dict:
     """Work done since the last reset_counters()."""
 
