@@ -1,5 +1,5 @@
 // What absorbs and scatters in skin: the coefficients of Donner and Jensen 2006, "A Spectral BSSRDF for Shading
-// Human Skin" (EGSR), Section 3, with vessels and bilirubin added.
+// Human Skin" (EGSR), Section 3, with vessels, bilirubin and tattoo ink added.
 #pragma once
 
 #include <cmath>
@@ -13,6 +13,9 @@ inline constexpr double min_wavelength_nm = 380, max_wavelength_nm = 780;
 /// The dermis scatters half as much as the epidermis (Donner and Jensen 2006).
 inline constexpr double dermis_per_epidermis_scattering = 0.5;
 
+/// Where ink_per_mm is the absorption of the ink.
+inline constexpr double ink_pivot_nm = 600;
+
 /// Where scatter_power changes nothing.
 inline constexpr double scatter_pivot_nm = 600;
 
@@ -22,6 +25,7 @@ struct Chromophores {
     double oxyhemoglobin, deoxyhemoglobin;      ///< absorption of whole blood, 150 g/L
     double baseline;                            ///< absorption of tissue without either
     double bilirubin;                           ///< absorption per umol/L
+    double ink;                                 ///< absorption over that at ink_pivot_nm, not a coefficient
     double epidermis_scattering;                ///< reduced scattering mu_s' of the epidermis, at scatter_scale 1
     double log_wavelength;                      ///< ln(wavelength / scatter_pivot_nm), not a coefficient
 };
@@ -56,7 +60,8 @@ OpticalCoefficients optical_coefficients(const SkinParameters& skin, const Chrom
     return {
         skin.melanin * std::lerp(pure.pheomelanin, pure.eumelanin, skin.melanin_blend)
             + (1 - skin.melanin) * pure.baseline,
-        skin.hemoglobin * blood + (1 - skin.hemoglobin) * pure.baseline + skin.bilirubin_umol_per_l * pure.bilirubin,
+        skin.hemoglobin * blood + (1 - skin.hemoglobin) * pure.baseline + skin.bilirubin_umol_per_l * pure.bilirubin
+            + skin.ink_per_mm * pure.ink,
         mu_s_prime,
         dermis_per_epidermis_scattering * mu_s_prime,
     };

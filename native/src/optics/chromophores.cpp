@@ -53,6 +53,8 @@ Chromophores chromophores_at(double nm) {
     c.pheomelanin = 2.9e14 * std::pow(nm, -4.75);
     c.baseline = 0.0244 + 8.53 * std::exp(-(nm - 154) / 66.2);
     c.bilirubin = nm < bilirubin.back()[0] ? absorption_per_extinction * 1e-6 * lookup(bilirubin, nm)[0] : 0;
+    // Grains of carbon far smaller than the wavelength absorb as its inverse (Bond and Bergstrom 2006).
+    c.ink = ink_pivot_nm / nm;
     // In 1/mm, twice the fit of Bashkatov et al. 2005 to whole skin; read as 1/cm it is ten times too small.
     c.epidermis_scattering = 14.74 * std::pow(nm, -0.22) + 2.2e11 * std::pow(nm, -4);
     c.log_wavelength = std::log(nm / scatter_pivot_nm);

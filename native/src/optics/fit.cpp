@@ -42,6 +42,8 @@ constexpr FitParameter rows[] = {
      "capillaries 0.003-0.005 mm, venules of the upper plexus to 0.02"},
     {"bilirubin_umol_per_l", &S::bilirubin_umol_per_l, FitScale::root, 0, 200, 8, 0.9, 0.9, 0,
      "plasma 3-17 umol/L, Duan and Zeng 2020; held, because measured faces are fitted no better with it"},
+    {"ink_per_mm", &S::ink_per_mm, FitScale::root, 0, 20, 1, 1.5, 1.5, 0,
+     "a guess, any tattoo; held, because skin without one has none"},
     {"surface_reflectance", nullptr, FitScale::linear, 0.01, 0.15, 0.035, 0.006, 0.03, fitted,
      "Fresnel at normal incidence, 0.028 (n = 1.4) to 0.040 (n = 1.5): the usual 8 degrees in a sphere"},
 };
@@ -148,6 +150,7 @@ double model(const Problem& p, const Values& x, const SkinParameters& skin, cons
     set(&S::scatter_power, (r.by_tau * tau - r.by_a1 * a1 - r.by_a2 * a2) * pure.log_wavelength);
     set(&S::vessel_radius_mm, r.by_a2 * skin.hemoglobin * f_by_radius / mu_s);
     set(&S::bilirubin_umol_per_l, r.by_a2 * pure.bilirubin / mu_s);
+    set(&S::ink_per_mm, r.by_a2 * pure.ink / mu_s);
     g[surface_row] = (p.specular_included ? 1 : 0) - r.total / entry;
     return added + passes * r.total;
 }
