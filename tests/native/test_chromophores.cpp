@@ -164,6 +164,18 @@ TEST(Chromophores, BilirubinIsYellow) {
     EXPECT_EQ(o.mu_a_epidermis, plain.mu_a_epidermis);
 }
 
+TEST(Chromophores, InkIsCarbonInTheDermis) {
+    SkinParameters skin;
+    skin.ink_per_mm = 3;
+    for (const double nm : {400.0, 600.0, 750.0}) {
+        const Chromophores c = chromophores_at(nm);
+        const OpticalCoefficients o = optical_coefficients(skin, c), plain = optical_coefficients({}, c);
+        EXPECT_NEAR(o.mu_a_dermis - plain.mu_a_dermis, 3 * 600 / nm, 1e-12) << nm;
+        EXPECT_EQ(o.mu_a_epidermis, plain.mu_a_epidermis);
+        EXPECT_EQ(o.mu_s_prime_dermis, plain.mu_s_prime_dermis);
+    }
+}
+
 TEST(Chromophores, WhatIsOffCostsNothing) {
     int calls = 0;
     const auto counted = [&](double x) { ++calls; return std::expm1(x); };
@@ -191,7 +203,7 @@ TEST(Chromophores, WavelengthsOutsideTheTablesAreAnError) {
 }
 
 TEST(Chromophores, EverySkinFitsThePathTable) {
-    // Least absorption and greatest optical thickness of the hard ranges.
+    // Least and greatest absorption and greatest optical thickness of the hard ranges.
     const auto row = [](std::string_view id) {
         return *std::find_if(std::begin(parameter_rows), std::end(parameter_rows),
                              [&](const auto& p) { return p.id == id; });
@@ -207,6 +219,17 @@ TEST(Chromophores, EverySkinFitsThePathTable) {
             const double mu_s_prime = optical_coefficients(skin, c).mu_s_prime_epidermis;
             EXPECT_GE(least / mu_s_prime, path_grid::reference_absorption) << nm;
             EXPECT_LE(thickest * mu_s_prime, path_grid::max_thickness) << nm;
+            skin.scatter_scale = row("scatter_scale").hard_min;
+            skin.melanin = row("melanin").hard_max;
+            skin.hemoglobin = row("hemoglobin").hard_max;
+            skin.bilirubin_umol_per_l = row("bilirubin_umol_per_l").hard_max;
+            skin.ink_per_mm = row("ink_per_mm").hard_max;
+            for (const double share : {0.0, 1.0}) {
+                skin.melanin_blend = skin.oxygenation = share;
+                const OpticalCoefficients darkest = optical_coefficients(skin, c);
+                EXPECT_LE(std::max(darkest.mu_a_epidermis, darkest.mu_a_dermis) / darkest.mu_s_prime_epidermis,
+                          path_grid::max_absorption) << nm;
+            }
         }
     }
 }

@@ -239,7 +239,7 @@ TEST(Fit, BadInputIsNamed) {
     outside.prior_sd[0] = -1;
     EXPECT_NE(refused({}, nm, outside).find("melanin"), std::string::npos);
     outside.prior_sd.pop_back();
-    EXPECT_NE(refused({}, nm, outside).find("9 standard deviations, needs 10"), std::string::npos);
+    EXPECT_NE(refused({}, nm, outside).find("10 standard deviations, needs 11"), std::string::npos);
 }
 
 TEST(Fit, ThreadsDoNotChangeIt) {

@@ -4,12 +4,16 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <set>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "effort.hpp"
+#include "sanguine/adding_doubling.hpp"
 #include "sanguine/burley.hpp"
 #include "sanguine/fresnel.hpp"
 
@@ -23,7 +27,7 @@ std::vector<double> wavelengths(double step) {
     return nm;
 }
 
-/// Both ends and the middle of every hard range that reaches the tissue: 3^5 skins.
+/// Both ends and the middle of every hard range that reaches the tissue; where the default is an end, both ends.
 std::vector<SkinParameters> extremes() {
     std::vector<SkinParameters> skins(1);
     for (const ParameterRow& p : parameter_rows) {
@@ -31,7 +35,7 @@ std::vector<SkinParameters> extremes() {
             continue;
         std::vector<SkinParameters> more;
         for (const SkinParameters& skin : skins)
-            for (const double value : {p.hard_min, p.default_value, p.hard_max}) {
+            for (const double value : std::set{p.hard_min, p.default_value, p.hard_max}) {
                 more.push_back(skin);
                 more.back().*p.field = value;
             }
@@ -62,14 +66,16 @@ TEST(Skin, ProfileIntegratesToReflectance) {
         ASSERT_NEAR(within[i] / r[i], 1, 1e-6);  // float sums in another order
 }
 
-TEST(Skin, DarkerWithMelaninAndHemoglobin) {
+TEST(Skin, DarkerWithWhatAbsorbs) {
     const std::vector<double> nm = wavelengths(10);
-    for (double SkinParameters::*field : {&SkinParameters::melanin, &SkinParameters::hemoglobin})
+    const std::pair<double SkinParameters::*, double> steps[] = {
+        {&SkinParameters::melanin, 0.01}, {&SkinParameters::hemoglobin, 0.01}, {&SkinParameters::ink_per_mm, 0.8}};
+    for (const auto& [field, step] : steps)
         for (const double thickness : {0.001, 0.02, 0.1, 0.5}) {
             std::vector<SkinParameters> skins(26);
             for (std::size_t i = 0; i < skins.size(); ++i) {
                 skins[i].epidermis_thickness_mm = thickness;
-                skins[i].*field = 0.01 * static_cast<double>(i);
+                skins[i].*field = step * static_cast<double>(i);
             }
             const std::vector<double> r = reflectance(skins, nm, 0, {});
             // Under half a millimetre of pigment blood changes less than a float's last digits, which are free to move.
@@ -78,6 +84,29 @@ TEST(Skin, DarkerWithMelaninAndHemoglobin) {
                     ASSERT_GT(r[i * nm.size() + w] * (1 + 1e-6), r[(i + 1) * nm.size() + w])
                         << i << ' ' << nm[w] << ' ' << thickness;
         }
+}
+
+TEST(Skin, TattoosAsAddingDoublingSeesThem) {
+    // From a shadow to more ink than shows: 1 % is the project's bar for totals.
+    double worst = 0;
+    const std::vector<double> nm = {450, 550, 650};
+    for (const double ink : {0.3, 2.0, 10.0, 20.0}) {
+        SkinParameters skin;
+        skin.ink_per_mm = ink;
+        const std::vector<double> seen = reflectance({&skin, 1}, nm, 1, {});
+        for (std::size_t w = 0; w < nm.size(); ++w) {
+            const OpticalCoefficients c = optical_coefficients(skin, chromophores_at(nm[w]));
+            const Problem problem{{{c.mu_a_epidermis, 5 * c.mu_s_prime_epidermis, 0.8, 1.4, skin.epidermis_thickness_mm},
+                                   {c.mu_a_dermis, 5 * c.mu_s_prime_dermis, 0.8, 1.4, half_space}},
+                                  Incidence::diffuse, {}};
+            Effort effort;
+            effort.tolerance = 1e-4;
+            const double exact = adding_doubling_solver().solve(problem, effort).Rd;
+            EXPECT_NEAR(seen[w] / exact, 1, 0.01) << ink << " 1/mm, " << nm[w] << " nm: " << exact;
+            worst = std::fmax(worst, std::fabs(seen[w] / exact - 1));
+        }
+    }
+    std::printf("tattoos: worst %.2f %%\n", 100 * worst);
 }
 
 TEST(Skin, RgbRingsAddUpToTheColour) {
