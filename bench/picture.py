@@ -282,8 +282,7 @@ def live_table(table_step: float, count: int = 1000) -> dict[str, Any]:
     t = np.random.default_rng(1).random((count, len(counts)))
     rows = np.repeat(skin_rows([plan.scene.skin]), count, axis=0)
     for axis, x in zip(plan.axes, t.T, strict=True):
-        value = axis.low * (axis.high / axis.low) ** x if axis.logarithmic else axis.low + (axis.high - axis.low) * x
-        rows[:, list(plan.scene.skin).index(axis.id)] = value
+        rows[:, list(plan.scene.skin).index(axis.id)] = [axis.value(t) for t in x]
     grid = [np.linspace(0.0, 1.0, n) for n in reversed(counts)]
     between = RegularGridInterpolator(grid, colours.astype(float))(t[:, ::-1])
     nm = np.arange(380.0, 781.0, 5.0)

@@ -15,7 +15,7 @@ from ..domain.effects import EFFECTS, ShaderInput
 from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
-from ..domain.shader import Shader, assemble, lobe_sockets
+from ..domain.shader import Shader, assemble, lobe_sockets, table_mixes, table_slices
 from .colour import working_space
 from .images import data_image
 from .osl import script_node
@@ -176,8 +176,7 @@ class _Builder:
     def read_table(self, table: Table, points: bpy.types.Node, lobes: bpy.types.Node) -> None:
         """One Image Texture node per quantity (and slice), all on one packed image."""
         image = data_image(f"{self.name} table", table.image)
-        slices = {"": "table_low"} if len(table.axes) < 3 else {"": "table_low", "_high": "table_high"}
-        for suffix, coordinates in slices.items():
+        for suffix, coordinates in table_slices(table.axes).items():
             for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix)):
                 shift = self.node("ShaderNodeVectorMath")
                 shift.operation = "ADD"
@@ -190,8 +189,8 @@ class _Builder:
                 node.label = socket
                 self.link(shift.outputs["Vector"], node.inputs["Vector"])
                 self.link(node.outputs["Color"], lobes.inputs[socket])
-        if len(table.axes) > 2:
-            self.link(points.outputs["table_mix"], lobes.inputs["table_mix"])
+        for mix in table_mixes(table.axes):
+            self.link(points.outputs[mix], lobes.inputs[mix])
 
     def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
         """Columns from left to right, so that a person can read the group."""

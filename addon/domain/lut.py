@@ -1,7 +1,8 @@
 """The table of scattering: Burley lobes over the chromophores that vary, as one image.
 
 Layout, from the first row up: for each quantity (weight of each lobe, then d_mm of each) one block; a block holds one tile
-per entry of axis 2; a tile has one row per entry of axis 1 and one column per entry of axis 0.
+per entry of axis 2, and that again per entry of axis 3; a tile has one row per entry of axis 1 and one column per entry
+of axis 0.
 """
 
 from __future__ import annotations

@@ -4,40 +4,51 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, scattering
 from .errors import InputError, nearest
 from .parameters import PARAMETERS
 from .quality import DEFAULT, Settings, preset
 
-AXIS_CHROMOPHORES = ("hemoglobin", "melanin", "oxygenation")
+AXIS_CHROMOPHORES = ("hemoglobin", "melanin", "oxygenation", "ink_per_mm")
 """Chromophores that the table can vary over, fastest axis first."""
 
 # Colour goes with the logarithm of an absorber's concentration over most of its range, so these axes are
 # spaced by ratio; oxygenation mixes two absorbers linearly. Steps keep linear interpolation between entries
 # within Delta E 0.3 at a table_step of 1 (tests/domain/test_lut.py measures it).
-_LOG_STEP = {"hemoglobin": 0.24, "melanin": 0.20}
+_LOG_STEP = {"hemoglobin": 0.24, "melanin": 0.20, "ink_per_mm": 0.70}
 _LINEAR_STEP = {"oxygenation": 0.15}
 # A logarithm needs a floor: below these fractions an absorber no longer shows.
 _LOG_FLOOR = {"hemoglobin": 5e-4, "melanin": 5e-4}
+# Or an offset, where most skin has none: about what the dermis absorbs without ink, so that steps are even in shade.
+_LOG_OFFSET = {"ink_per_mm": 0.04}
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of the table: `count` values of a chromophore from `low` to `high`."""
+    """One axis of the table: `count` values of a chromophore from `low` to `high`.
+
+    Evenly spaced, or if `logarithmic` by equal ratios of the value plus `offset`.
+    """
 
     id: str
     low: float
     high: float
     count: int
     logarithmic: bool
+    offset: float = 0.0
+
+    def value(self, t: float) -> float:
+        """What stands at `t`, 0 to 1 along the axis."""
+        if self.logarithmic:
+            low, high = self.low + self.offset, self.high + self.offset
+            return low * math.exp(math.log(high / low) * t) - self.offset
+        return self.low + (self.high - self.low) * t
 
     def values(self) -> list[float]:
-        if self.logarithmic:
-            ratio = math.log(self.high / self.low) / (self.count - 1)
-            return [self.low * math.exp(ratio * i) for i in range(self.count)]
-        return [self.low + (self.high - self.low) * i / (self.count - 1) for i in range(self.count)]
+        inside = [self.value(i / (self.count - 1)) for i in range(1, self.count - 1)]
+        return [self.low, *inside, self.high]
 
 
 @dataclass(frozen=True)
@@ -57,7 +68,9 @@ class Plan:
 
     def without(self, effect_id: str) -> Plan:
         """The plan as it would be if one effect did not exist, to price that effect."""
-        return _decide(self.scene, self.settings, tuple(effect for effect in EFFECTS if effect.id != effect_id))
+        strengths = {name: value for name, value in self.scene.strengths.items() if name != effect_id}
+        scene = replace(self.scene, strengths=strengths)
+        return _decide(scene, self.settings, tuple(effect for effect in EFFECTS if effect.id != effect_id))
 
     @property
     def entries(self) -> int:
@@ -74,13 +87,13 @@ def _decide(scene: Scene, settings: Settings, effects: tuple[Effect, ...]) -> Pl
     decisions = {effect.id: effect.activate(scene) for effect in effects}
     active = [effect for effect in effects if decisions[effect.id].active]
     axes = _axes(scene, active, settings.table_step)
-    fragments = [effect.fragment(scene) for effect in active]
+    fragments = [fragment for effect in active for fragment in effect.fragments(scene)]
     return Plan(
         scene=scene,
         settings=settings,
         decisions=decisions,
         axes=axes,
-        fragments=tuple(f for f in fragments if f is not None),
+        fragments=tuple({fragment.file: fragment for fragment in fragments}.values()),
         maps=tuple(dict.fromkeys(name for effect in active for name in effect.maps(scene))),
     )
 
@@ -104,8 +117,9 @@ def check_strengths(given: Mapping[str, float], where: str) -> dict[str, float]:
 def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, ...]:
     """The chromophores that differ between places or moments, with the range each one takes."""
     regions = (*scene.regions, ELSEWHERE)
+    written = {name for effect in active for name in effect.writes}
     bounds: Bounds = {
-        name: {region: _slider_reach(scene, name) for region in regions} for name in AXIS_CHROMOPHORES
+        name: {region: _slider_reach(scene, name, written) for region in regions} for name in AXIS_CHROMOPHORES
     }
     for effect in active:
         bounds = effect.bounds(scene, bounds)
@@ -119,9 +133,9 @@ def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, 
     return tuple(axes)
 
 
-def _slider_reach(scene: Scene, name: str) -> tuple[float, float]:
-    """The skin's own value, or all that the artist's slider reaches while he works."""
-    if scene.live:
+def _slider_reach(scene: Scene, name: str, written: set[str]) -> tuple[float, float]:
+    """The skin's own value, or all that the artist's slider reaches while he works. Ink has one where a tattoo is."""
+    if scene.live and (name != "ink_per_mm" or name in written):
         row = PARAMETERS[name]
         value = scene.skin[name]
         return min(row.soft_min, value), max(row.soft_max, value)
@@ -129,11 +143,13 @@ def _slider_reach(scene: Scene, name: str) -> tuple[float, float]:
 
 
 def _axis(name: str, low: float, high: float, table_step: float) -> Axis | None:
+    offset = _LOG_OFFSET.get(name, 0.0)
     if name in _LOG_STEP:
-        low, high = max(low, _LOG_FLOOR[name]), max(high, _LOG_FLOOR[name])
-        span, step = math.log(high / low), table_step * _LOG_STEP[name]
+        floor = _LOG_FLOOR.get(name, 0.0)
+        low, high = max(low, floor), max(high, floor)
+        span, step = math.log((high + offset) / (low + offset)), table_step * _LOG_STEP[name]
     else:
         span, step = high - low, table_step * _LINEAR_STEP[name]
     if span < 1e-9:
         return None
-    return Axis(name, low, high, max(2, math.ceil(span / step) + 1), name in _LOG_STEP)
+    return Axis(name, low, high, max(2, math.ceil(span / step) + 1), name in _LOG_STEP, offset)

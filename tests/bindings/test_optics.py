@@ -26,6 +26,7 @@ def test_parameters_have_every_field():
     assert IDS == [
         "melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm", "oil", "roughness",
         "scatter_scale", "vessel_radius_mm", "bilirubin_umol_per_l", "scatter_power",
+        "ink_per_mm",
     ]  # fmt: skip
     assert [row["id"] for row in core.derived_parameters()] == ["oxyhemoglobin", "deoxyhemoglobin"]
 

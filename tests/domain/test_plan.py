@@ -39,7 +39,8 @@ def test_bare_skin_runs_scattering_alone():
 def test_constants_of_the_skin_get_no_axis_and_no_instruction(live):
     emotions = ({}, {"anger": 1.0})
     plain = make_plan(scene(emotions, live=live))
-    for change in ({"scatter_scale": 0.8}, {"scatter_power": 0.5}, {"vessel_radius_mm": 0.01}, {"bilirubin_umol_per_l": 40.0}):
+    for change in ({"scatter_scale": 0.8}, {"scatter_power": 0.5}, {"vessel_radius_mm": 0.01}, {"bilirubin_umol_per_l": 40.0},
+                   {"ink_per_mm": 3.0}):
         plan = make_plan(scene(emotions, live=live, **change))
         assert plan.axes == plain.axes and plan.maps == plain.maps
         assert {k: s.source for k, s in assemble(plan).items()} == {k: s.source for k, s in assemble(plain).items()}
@@ -74,11 +75,12 @@ def test_no_trace_of_an_inactive_effect(effect):
     """Neither its inputs nor its code are in the shader, whichever effect is off."""
     full = scene(frames=({"anger": 1.0},), strengths={"mottle": 1, "relief": 1, "anatomy": 1}, oil=0.5)
     plan = make_plan(full)
-    fragment = effect.fragment(full)
-    mine = {item.name for item in fragment.inputs}
-    others = {item.name for other in plan.fragments if other.file != fragment.file for item in other.inputs}
+    files = {fragment.file for fragment in effect.fragments(full)}
+    assert files
+    mine = {item.name for fragment in effect.fragments(full) for item in fragment.inputs}
+    others = {item.name for other in plan.fragments if other.file not in files for item in other.inputs}
     without = plan.without(effect.id)
-    assert fragment.file not in {f.file for f in without.fragments}
+    assert not files & {f.file for f in without.fragments}
     text = "".join(shader.source for shader in assemble(without).values())
     for name in mine - others:
         declared = re.search(rf"^ +(float|color|vector) {name} = ", text, re.MULTILINE)

@@ -12,16 +12,21 @@ from sanguine.domain.parameters import PARAMETERS, default_skin
 from sanguine.domain.plan import AXIS_CHROMOPHORES, Axis
 from stability import extremes
 
-LOGARITHMIC = {"hemoglobin": True, "melanin": True, "oxygenation": False}
+LOGARITHMIC = {"hemoglobin": True, "melanin": True, "oxygenation": False, "ink_per_mm": True}
+OFFSET = {"ink_per_mm": 0.04}
 FLOOR = 5e-4
-"""A logarithmic axis begins no lower (plan.py)."""
+"""A logarithmic axis without an offset begins no lower (plan.py)."""
 
 
 def whole_axis(name: str, count: int, low: float | None = None, high: float | None = None) -> Axis:
     row = PARAMETERS[name]
     low = row.hard_min if low is None else low
     high = row.hard_max if high is None else high
-    return Axis(name, max(low, FLOOR) if LOGARITHMIC[name] else low, high, count, LOGARITHMIC[name])
+    return made(name, max(low, FLOOR) if LOGARITHMIC[name] and name not in OFFSET else low, high, count)
+
+
+def made(name: str, low: float, high: float, count: int) -> Axis:
+    return Axis(name, low, high, count, LOGARITHMIC[name], OFFSET.get(name, 0.0))
 
 
 def sound(table) -> None:
@@ -33,7 +38,7 @@ def sound(table) -> None:
     assert np.isfinite(table.clamped).all() and np.isfinite(table.fit_error).all()
 
 
-@pytest.mark.parametrize("names", [c for k in (1, 2, 3) for c in itertools.combinations(AXIS_CHROMOPHORES, k)], ids="-".join)
+@pytest.mark.parametrize("names", [c for k in (1, 2, 3, 4) for c in itertools.combinations(AXIS_CHROMOPHORES, k)], ids="-".join)
 def test_tables_over_whole_ranges(names):
     """Every set of axes over the whole hard ranges, every other parameter at both ends: finite, weights not negative and
     at most 1 + 1e-6 together (float32), widths above 0."""
@@ -67,7 +72,8 @@ def lookup(axis: Axis, table: np.ndarray, value: float) -> np.ndarray:
     """Linear between entries, the last entry beyond the ends: what an image node in EXTEND does with the coordinates of
     shaders_osl/chromophores.osl, whose own test renders them."""
     at = np.interp(value, axis.values(), np.arange(axis.count)) if not axis.logarithmic else np.interp(
-        np.log(np.clip(value, axis.low, axis.high)), np.log(axis.values()), np.arange(axis.count))
+        np.log(np.clip(value, axis.low, axis.high) + axis.offset), np.log(np.array(axis.values()) + axis.offset),
+        np.arange(axis.count))
     first = min(int(at), axis.count - 2)
     return table[:, first] * (1 - (at - first)) + table[:, first + 1] * (at - first)
 
@@ -81,7 +87,8 @@ def test_lookups_at_and_beyond_the_edges(name):
     for end, outward, column in ((axis.low, -1, 0), (axis.high, 1, -1)):
         for value in (end, end + outward * 1e-12, end + outward, outward * 1e300, outward * np.inf):
             np.testing.assert_allclose(lookup(axis, image, value), image[:, column], rtol=1e-6)
-        inside = end * (1 - outward * 1e-4) if axis.logarithmic else end - outward * 1e-4 * (axis.high - axis.low)
+        inside = (end + axis.offset) * (1 - outward * 1e-4) - axis.offset if axis.logarithmic \
+            else end - outward * 1e-4 * (axis.high - axis.low)
         colour = lookup(axis, image, inside)[:LOBES].sum(0)
         np.testing.assert_allclose(colour, image[:LOBES, column].sum(0), rtol=1e-3)
 
@@ -97,7 +104,7 @@ def test_any_axis_any_skin(name, a, b, count, data):
     if high - low < 1e-9:
         high = low + 1e-9
     skin = {key: data.draw(st.floats(r.hard_min, r.hard_max), label=key) for key, r in PARAMETERS.items()}
-    table = bake((Axis(name, low, min(high, row.hard_max), count, LOGARITHMIC[name]),), skin, "rec709")
+    table = bake((made(name, low, min(high, row.hard_max), count),), skin, "rec709")
     sound(table)
     if name != "oxygenation":
         rows = entry_skins(table.axes, skin)

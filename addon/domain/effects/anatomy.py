@@ -17,8 +17,8 @@ def _bounds(scene: Scene, bounds: Bounds) -> Bounds:
     return shift_bounds(bounds, "oxygenation", {r: (s, s) for r, s in shifts.items()})
 
 
-def _fragment(_scene: Scene) -> Fragment:
-    return Fragment(
+def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
+    fragment = Fragment(
         stage="chromophores",
         file="anatomy.osl",
         inputs=(
@@ -27,6 +27,7 @@ def _fragment(_scene: Scene) -> Fragment:
             ShaderInput("anatomy", "float", "strength", "anatomy"),
         ),
     )
+    return (fragment,)
 
 
 EFFECT = Effect(
@@ -36,7 +37,7 @@ EFFECT = Effect(
     reads=("hemoglobin", "melanin", "oxygenation", "oil"),
     writes=("hemoglobin", "melanin", "oxygenation", "oil"),
     activate=lambda scene: strength_activation(scene, "anatomy", needs_regions=True),
-    fragment=_fragment,
+    fragments=_fragments,
     bounds=_bounds,
     maps=lambda scene: (MAP,),
     default_strength=1.0,

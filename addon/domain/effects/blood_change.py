@@ -37,15 +37,16 @@ def blood_effect(effect_id: str, label: str, help: str, quantity: str) -> Effect
         emotions = sorted({e for frame in scene.frames if frame.id in frames for e, v in frame.emotions.items() if v})
         return Activation(True, f"{', '.join(emotions)} move{'s' if len(emotions) == 1 else ''} {quantity}", frames)
 
-    def fragment(scene: Scene) -> Fragment:
+    def fragments(scene: Scene) -> tuple[Fragment, ...]:
         terms = {region: blood_property(quantity, region) for region in changes(scene)}
         inputs = tuple(ShaderInput(name, "float", "object", name) for name in terms.values())
-        return Fragment(
+        fragment = Fragment(
             stage="chromophores",
             file=f"{effect_id}.osl",
             inputs=mask_inputs(scene, tuple(terms)) + inputs,
             defines={f"{quantity.upper()}_CHANGE": masked_sum(scene, terms)},
         )
+        return (fragment,)
 
     def bounds(scene: Scene, before: Bounds) -> Bounds:
         return shift_bounds(before, quantity, changes(scene))
@@ -57,7 +58,7 @@ def blood_effect(effect_id: str, label: str, help: str, quantity: str) -> Effect
         reads=(quantity,),
         writes=(quantity,),
         activate=activate,
-        fragment=fragment,
+        fragments=fragments,
         bounds=bounds,
         maps=lambda scene: tuple(i.key for i in mask_inputs(scene, tuple(changes(scene)))),
     )

@@ -52,6 +52,9 @@ class Scene:
     # True while an artist works: every control may still move, so axes span what sliders reach.
     live: bool = False
     growth: Growth = Growth()
+    # Maps that came with the face (from a picture, from elsewhere): map id -> chromophore that it holds -> the range
+    # over its texels.
+    maps: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,8 @@ class Effect:
     reads: tuple[str, ...]  # chromophores or parameters it needs
     writes: tuple[str, ...]  # chromophores it changes
     activate: Callable[[Scene], Activation]
-    fragment: Callable[[Scene], Fragment | None]
+    # Effects may share a fragment: of those with the same file, all alike, the shader gets one.
+    fragments: Callable[[Scene], tuple[Fragment, ...]]
     bounds: Callable[[Scene, Bounds], Bounds] = _unchanged
     maps: Callable[[Scene], tuple[str, ...]] = _no_maps
     # An effect with a slider of its own has a default strength (0 = off unless asked for).

@@ -15,8 +15,8 @@ def _bounds(scene: Scene, bounds: Bounds) -> Bounds:
     return bounds
 
 
-def _fragment(_scene: Scene) -> Fragment:
-    return Fragment(
+def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
+    fragment = Fragment(
         stage="chromophores",
         file="mottle.osl",
         inputs=(
@@ -25,6 +25,7 @@ def _fragment(_scene: Scene) -> Fragment:
         ),
         defines={"BLOOD_SHARE": f"{BLOOD_SHARE}", "PIGMENT_SHARE": f"{PIGMENT_SHARE}"},
     )
+    return (fragment,)
 
 
 EFFECT = Effect(
@@ -34,7 +35,7 @@ EFFECT = Effect(
     reads=("hemoglobin", "melanin"),
     writes=("hemoglobin", "melanin"),
     activate=lambda scene: strength_activation(scene, "mottle"),
-    fragment=_fragment,
+    fragments=_fragments,
     bounds=_bounds,
     default_strength=0.0,
 )

@@ -13,8 +13,8 @@ def _activate(scene: Scene) -> Activation:
     return Activation(True, f"oil is {oil:g}", tuple(frame.id for frame in scene.frames))
 
 
-def _fragment(_scene: Scene) -> Fragment:
-    return Fragment(
+def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
+    fragment = Fragment(
         stage="surface",
         file="oil.osl",
         inputs=(
@@ -28,6 +28,7 @@ def _fragment(_scene: Scene) -> Fragment:
             "FILM_ALBEDO": ", ".join(f"{value:.5f}" for value in film_table(sanguine_core.OIL_FILM_INDEX).ravel()),
         },
     )
+    return (fragment,)
 
 
 EFFECT = Effect(
@@ -37,5 +38,5 @@ EFFECT = Effect(
     reads=("oil", "roughness"),
     writes=(),
     activate=_activate,
-    fragment=_fragment,
+    fragments=_fragments,
 )

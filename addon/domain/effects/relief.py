@@ -3,8 +3,8 @@
 from .effect import Effect, Fragment, Scene, ShaderInput, strength_activation
 
 
-def _fragment(_scene: Scene) -> Fragment:
-    return Fragment(
+def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
+    fragment = Fragment(
         stage="relief",
         file="relief.osl",
         inputs=(
@@ -12,6 +12,7 @@ def _fragment(_scene: Scene) -> Fragment:
             ShaderInput("relief", "float", "strength", "relief"),
         ),
     )
+    return (fragment,)
 
 
 EFFECT = Effect(
@@ -21,6 +22,6 @@ EFFECT = Effect(
     reads=(),
     writes=(),
     activate=lambda scene: strength_activation(scene, "relief"),
-    fragment=_fragment,
+    fragments=_fragments,
     default_strength=0.0,
 )

@@ -13,9 +13,9 @@ EFFECT = Effect(
     help="Light that enters the skin, scatters in both layers and leaves at a distance.",
     reads=(
         "melanin", "melanin_blend", "hemoglobin", "oxygenation", "epidermis_thickness_mm", "scatter_scale",
-        "scatter_power", "vessel_radius_mm", "bilirubin_umol_per_l",
+        "scatter_power", "vessel_radius_mm", "bilirubin_umol_per_l", "ink_per_mm",
     ),
     writes=(),
     activate=_activate,
-    fragment=lambda scene: None,  # it is the fixed code of both shaders
+    fragments=lambda scene: (),  # it is the fixed code of both shaders
 )
