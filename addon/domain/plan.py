@@ -127,7 +127,7 @@ def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, 
     for name in AXIS_CHROMOPHORES:
         low = min(interval[0] for interval in bounds[name].values())
         high = max(interval[1] for interval in bounds[name].values())
-        axis = _axis(name, low, high, table_step)
+        axis = spaced(name, low, high, table_step)
         if axis:
             axes.append(axis)
     return tuple(axes)
@@ -142,7 +142,8 @@ def _slider_reach(scene: Scene, name: str, written: set[str]) -> tuple[float, fl
     return scene.skin[name], scene.skin[name]
 
 
-def _axis(name: str, low: float, high: float, table_step: float) -> Axis | None:
+def spaced(name: str, low: float, high: float, table_step: float) -> Axis | None:
+    """The axis of a chromophore that runs from `low` to `high`; None where it stays."""
     offset = _LOG_OFFSET.get(name, 0.0)
     if name in _LOG_STEP:
         floor = _LOG_FLOOR.get(name, 0.0)

@@ -90,7 +90,7 @@ def test_surface():
     [
         (lambda: core.reflectance(skins({"melanin": 0.6}), NM), ["skin 0", "melanin", "0.6", "0 to 0.5"]),
         (lambda: core.reflectance(skins({}, {"oxygenation": np.nan}), NM), ["skin 1", "oxygenation", "nan", "0 to 1"]),
-        (lambda: core.reflectance(skins({})[:, :3], NM), ["3 values", "needs 11"]),
+        (lambda: core.reflectance(skins({})[:, :3], NM), ["3 values", "needs 12"]),
         (lambda: core.reflectance(skins({}), np.array([800.0])), ["wavelengths_nm", "800", "380 to 780 nm"]),
         (lambda: core.reflectance(skins({}), NM, threads=-1), ["threads", "-1"]),
         (lambda: core.radial_profile(skins({}), NM, np.array([0.0])), ["radius_mm", "above 0"]),

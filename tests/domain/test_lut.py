@@ -7,11 +7,17 @@ import sanguine_core
 from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.lut import LOBES, QUANTITIES, bake, entry_skins, table_height
 from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
-from sanguine.domain.plan import Axis, check_strengths, make_plan
+from sanguine.domain.plan import Axis, check_strengths, make_plan, spaced
 
 HEMOGLOBIN = Axis("hemoglobin", 0.002, 0.06, 15, True)
 MELANIN = Axis("melanin", 0.01, 0.06, 10, True)
 OXYGENATION = Axis("oxygenation", 0.5, 0.95, 4, False)
+INK = Axis("ink_per_mm", 0.0, 5.0, 3, True, 0.04)
+
+
+def lab(rgb):
+    white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    return colour.XYZ_to_Lab(colour.RGB_to_XYZ(np.maximum(rgb, 0.0), "sRGB"), white)
 
 
 def test_layout_is_axis_0_along_x_then_tiles_then_quantities():
@@ -27,6 +33,27 @@ def test_layout_is_axis_0_along_x_then_tiles_then_quantities():
     np.testing.assert_allclose(table.image[row, i], fit["weights"][0, quantity], rtol=1e-5)
     row += LOBES * OXYGENATION.count * MELANIN.count
     np.testing.assert_allclose(table.image[row, i], fit["d_mm"][0, quantity], rtol=1e-5)
+
+
+def test_a_fourth_axis_stacks_the_tiles():
+    axes = (Axis("hemoglobin", 0.002, 0.06, 4, True), Axis("melanin", 0.01, 0.06, 3, True),
+            Axis("oxygenation", 0.5, 0.95, 2, False), INK)
+    table = bake(axes, default_skin(), "rec709")
+    assert table.image.shape == (QUANTITIES * 3 * 2 * 3, 4, 3) == (table_height(axes), 4, 3)
+    at = (1, 2, 1, 2)
+    skin = default_skin() | {axis.id: axis.values()[n] for axis, n in zip(axes, at, strict=True)}
+    fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=LOBES)
+    for quantity in range(LOBES):
+        row = ((quantity * 3 + at[3]) * 2 + at[2]) * 3 + at[1]
+        np.testing.assert_allclose(table.image[row, at[0]], fit["weights"][0, quantity], rtol=1e-5)
+
+
+def test_values_run_from_end_to_end():
+    for axis in (HEMOGLOBIN, OXYGENATION, INK):
+        values = axis.values()
+        assert (values[0], values[-1]) == (axis.low, axis.high) and len(values) == axis.count
+        assert np.all(np.diff(values) > 0.0)
+    assert np.ptp(np.diff(np.log(np.array(INK.values()) + INK.offset))) < 1e-12
 
 
 def test_a_constant_skin_is_one_entry():
@@ -57,9 +84,24 @@ def test_interpolated_colour_is_the_solved_colour(melanin):
             middle = np.sqrt(low * high) if axis.logarithmic else 0.5 * (low + high)
             skins = skin_rows([dict(scene.skin) | {axis.id: value} for value in (low, high, middle)])
             rgb = sanguine_core.burley_lobes(skins, "rec709", lobe_count=LOBES)["rgb"]
-            lab = [colour.XYZ_to_Lab(colour.RGB_to_XYZ(c, "sRGB"), colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"])
-                   for c in (0.5 * (rgb[0] + rgb[1]), rgb[2])]
-            assert colour.delta_E(*lab, method="CIE 2000") < 0.3, (axis.id, low, high)
+            seen = lab(0.5 * (rgb[0] + rgb[1])), lab(rgb[2])
+            assert colour.delta_E(*seen, method="CIE 2000") < 0.3, (axis.id, low, high)
+
+
+@pytest.mark.parametrize("melanin", [0.005, 0.05, 0.2])
+@pytest.mark.parametrize("hemoglobin", [5e-4, 0.014, 0.1])
+@pytest.mark.parametrize("most", [0.5, 20.0])
+def test_interpolated_ink_is_the_solved_ink(melanin, hemoglobin, most):
+    """The same bar for tattoos, faint and opaque, over little and much blood."""
+    axis = spaced("ink_per_mm", 0.0, most, 1.0)
+    values = np.array(axis.values())
+    steps = np.linspace(0.0, 1.0, 2 * axis.count - 1)
+    assert [axis.value(t) for t in steps[::2]] == pytest.approx(values)
+    skin = default_skin() | {"melanin": melanin, "hemoglobin": hemoglobin}
+    rows = skin_rows([skin | {"ink_per_mm": axis.value(t)} for t in steps])
+    rgb = sanguine_core.burley_lobes(rows, "rec709", lobe_count=LOBES)["rgb"]
+    differences = colour.delta_E(lab(0.5 * (rgb[:-2:2] + rgb[2::2])), lab(rgb[1::2]), method="CIE 2000")
+    assert differences.max() < 0.3, differences
 
 
 def test_entries_cover_the_grid():
