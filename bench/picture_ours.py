@@ -260,6 +260,7 @@ def face_costs(settings: list[Settings], plan_of: Callable[[Settings], Plan], re
     from sanguine.blender.face import add_face
     from sanguine.blender.surface import read_surface
     from sanguine.domain.lut import bake
+    from sanguine.domain.texel_density import MapSizes
 
     empty_scene(16, 16, 1)
     surface = read_surface(add_face("female").skin)
@@ -269,7 +270,7 @@ def face_costs(settings: list[Settings], plan_of: Callable[[Settings], Plan], re
             plan = plan_of(each)
             start = time.process_time()
             bake(plan.axes, plan.scene.skin, "rec709", lobes=each.lobes)
-            bake_maps(plan, surface, each.map_size, MapCache(None))
+            bake_maps(plan, surface, MapSizes(each.map_size, each.map_size), MapCache(None))
             found[k] = min(found[k], time.process_time() - start)
     return found
 

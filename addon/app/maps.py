@@ -17,6 +17,7 @@ from ..domain.blood import ANATOMY, Rest
 from ..domain.effects import Growth, anatomy
 from ..domain.effects.regions import region_images
 from ..domain.plan import Plan
+from ..domain.texel_density import MapSizes
 from ..domain.udim import FIRST_TILE, tile_offset, tiles_of
 from .map_cache import MapCache, key_of
 
@@ -124,25 +125,25 @@ class Grown:
 
 
 def bake_maps(
-    plan: Plan, surface: Surface, size: int, cache: MapCache | None = None, progress: Progress | None = None
+    plan: Plan, surface: Surface, sizes: MapSizes, cache: MapCache | None = None, progress: Progress | None = None
 ) -> dict[str, dict[int, np.ndarray]]:
     """The maps that a plan makes from the face itself; nothing unasked for.
 
-    Returns map id -> UDIM tile -> (size, size, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`,
+    Returns map id -> UDIM tile -> square (H, W, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`,
     called with what is done and what there is to do, answers False.
     """
     cache = cache or MapCache()
     made: dict[str, dict[int, np.ndarray]] = {}
     for tile in surface.tiles if plan.maps else ():
-        layers = Grown(surface.at_tile(tile), plan.scene.growth, size, cache, progress)
+        layers = Grown(surface.at_tile(tile), plan.scene.growth, sizes.detail, cache, progress)
         for name in plan.maps:
-            if (image := _bake(name, plan, layers)) is not None:
+            if (image := _bake(name, plan, layers, sizes.smooth)) is not None:
                 made.setdefault(name, {})[tile] = image
     return made
 
 
-def _bake(name: str, plan: Plan, layers: Grown) -> np.ndarray | None:
-    face, size, cache = layers.surface, layers.size, layers.cache
+def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
+    face, cache = layers.surface, layers.cache
     images = region_images(tuple(face.regions))
     if name in images:
         return cache.get(key_of(face.digest, name, size, _PADDING), lambda: _masks(face, size, images[name]))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
-import numpy as np
-import sanguine_core
 
-from ..domain.head import build_head, load_presets, load_regions
+from ..app.faces import example_head
+from ..domain.head import load_presets
 from ..domain.resources import rigs_path
 from .controls import add_controls, drive_shape_keys
 from .head import build_face
@@ -32,15 +30,10 @@ class Face:
 
 def add_face(head_id: str) -> Face:
     """Builds a head of `rigs/heads.toml` in the open scene. Raises HeadError when its package is not installed."""
-    preset = load_presets(rigs_path("heads.toml"))[head_id]
-    head = build_head(preset, load_regions(rigs_path("regions.toml")), _read_top_down)
-    objects = build_face(head, preset, bpy.data.materials.new("skin"))
+    head = example_head(head_id)
+    objects = build_face(head, load_presets(rigs_path("heads.toml"))[head_id], bpy.data.materials.new("skin"))
     store_regions(objects.skin, head.regions)
     add_controls(objects.rig)
     drive_shape_keys(objects.rig, objects.parts.values())
     landmarks = {name: tuple(float(x) for x in place) for name, place in head.landmarks.items()}
     return Face(objects.skin, objects.rig, landmarks)
-
-
-def _read_top_down(path: Path) -> np.ndarray:
-    return sanguine_core.read_image(str(path))[::-1]

@@ -10,7 +10,7 @@ import numpy as np
 from ..app.maps import Surface, bake_maps
 from ..domain.blood import BLOOD_CHANNELS
 from ..domain.plan import Plan
-from ..domain.texel_density import map_size, mm_per_uv
+from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE
 from .controls import drive_blood
 from .material import MARK, build_skin_material, remove_skin_material
@@ -47,14 +47,14 @@ def _bake(
 ) -> dict[str, np.ndarray | dict[int, np.ndarray]]:
     """Map id -> image, or images by UDIM tile where the layout has more than the first."""
     surface = read_surface(face)
-    tiles = bake_maps(plan, surface, needed_map_size(face, surface, plan), progress=progress)
+    tiles = bake_maps(plan, surface, needed_sizes(face, surface, plan), progress=progress)
     return {name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()}
 
 
-def needed_map_size(face: bpy.types.Object, surface: Surface, plan: Plan) -> int:
-    """Texels along a side: what the scene's camera can tell apart, at most what the quality allows."""
+def needed_sizes(face: bpy.types.Object, surface: Surface, plan: Plan) -> MapSizes:
+    """What the scene's camera can tell apart, at the plan's quality."""
     span_mm = mm_per_uv(surface.position_mm, surface.uv, surface.triangles, surface.corner_vertex)
-    return map_size(span_mm, pixel_mm(bpy.context.scene, face), plan.settings.map_size)
+    return map_sizes(span_mm, pixel_mm(bpy.context.scene, face), plan.settings)
 
 
 def skin_slot(face: bpy.types.Object) -> int:

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-# Below this a map holds too little to filter; above, the quality's own size is the bound.
+from .quality import DEFAULT, Settings, preset
+
+# Below this a map holds too little to filter.
 SMALLEST_SIZE = 64
+# A head at 0.3 mm per texel. Beyond it a tile takes more than a gigabyte while it is painted: use UDIM tiles.
+LARGEST_DETAIL = 4096
+DETAIL_WITHOUT_CAMERA = 2048
 
 # Share of the surface (by area) that gets at least one texel per pixel. The rest is where a UV layout crams skin
 # together: the back of the ears, the rim of the neck.
@@ -32,12 +38,29 @@ def mm_per_uv(position_mm: np.ndarray, uv: np.ndarray, triangles: np.ndarray, co
     return float(scale[order][np.searchsorted(below, _SERVED_SHARE * below[-1])])
 
 
-def map_size(span_mm: float, pixel_mm: float | None, largest: int) -> int:
-    """Texels along a side, a power of two: one per pixel of `pixel_mm` on the skin, at most `largest`.
+@dataclass(frozen=True)
+class MapSizes:
+    """Texels along a side. smooth: masks of regions and what follows from them. detail: features down to the pore."""
 
-    span_mm: of `mm_per_uv`. pixel_mm: what one pixel covers where the camera is nearest; None when no camera is known.
+    smooth: int
+    detail: int
+
+
+def map_sizes(span_mm: float, pixel_mm: float | None, settings: Settings) -> MapSizes:
+    """Sizes of the maps of one UV tile, powers of two.
+
+    span_mm: of `mm_per_uv`. pixel_mm: what one pixel covers on the skin where the camera is nearest; None when no
+    camera is known. Smooth maps have at most the size that the quality was measured with; details get a texel per pixel
+    at the default quality, fewer below it in the same proportion.
     """
-    if pixel_mm is None or not pixel_mm > 0.0 or not span_mm > 0.0:
+    default = preset(DEFAULT).map_size
+    smooth = _bounded(span_mm, pixel_mm, settings.map_size)
+    texel_mm = pixel_mm and pixel_mm * default / min(settings.map_size, default)
+    return MapSizes(smooth, _bounded(span_mm, texel_mm, LARGEST_DETAIL if texel_mm else DETAIL_WITHOUT_CAMERA))
+
+
+def _bounded(span_mm: float, texel_mm: float | None, largest: int) -> int:
+    if texel_mm is None or not texel_mm > 0.0 or not span_mm > 0.0:
         return largest
-    wanted = span_mm / pixel_mm
-    return max(min(2 ** math.ceil(math.log2(max(wanted, 1.0))), largest), min(SMALLEST_SIZE, largest))
+    wanted = 2 ** math.ceil(math.log2(max(span_mm / texel_mm, 1.0)))
+    return max(min(wanted, largest), min(SMALLEST_SIZE, largest))

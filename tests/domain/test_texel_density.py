@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from sanguine.domain.texel_density import SMALLEST_SIZE, map_size, mm_per_uv
+from sanguine.domain.quality import PRESETS
+from sanguine.domain.texel_density import DETAIL_WITHOUT_CAMERA, LARGEST_DETAIL, SMALLEST_SIZE, map_sizes, mm_per_uv
 
 # Two triangles: a square of 1 in UV, or of whatever `square` is given, over 200 x 200 mm.
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -37,10 +38,23 @@ def test_a_crammed_tenth_does_not_decide():
     assert mm_per_uv(position_mm, uv, triangles, np.arange(7, dtype=np.int32)) == pytest.approx(200.0)
 
 
-def test_one_texel_per_pixel_in_powers_of_two():
-    assert map_size(200.0, 0.2, 4096) == 1024  # 1000 texels
-    assert map_size(200.0, 0.19, 4096) == 2048
-    assert map_size(200.0, 0.01, 4096) == 4096  # the quality's own bound
-    assert map_size(200.0, 50.0, 4096) == SMALLEST_SIZE
-    assert map_size(200.0, None, 2048) == 2048  # no camera is known
-    assert map_size(0.0, 1.0, 32) == 32
+FINAL, DRAFT = PRESETS["final"].settings, PRESETS["draft"].settings
+
+
+def test_details_have_a_texel_per_pixel_in_powers_of_two():
+    assert map_sizes(200.0, 0.2, FINAL).detail == 1024  # 1000 texels
+    assert map_sizes(200.0, 0.19, FINAL).detail == 2048
+    assert map_sizes(200.0, 0.001, FINAL).detail == LARGEST_DETAIL
+    assert map_sizes(200.0, 50.0, FINAL).detail == SMALLEST_SIZE
+    assert map_sizes(200.0, None, FINAL).detail == DETAIL_WITHOUT_CAMERA
+
+
+def test_a_lower_quality_has_fewer_in_proportion():
+    assert map_sizes(200.0, 0.2, DRAFT).detail == 1024 * DRAFT.map_size // FINAL.map_size
+
+
+def test_smooth_maps_stop_at_the_size_the_quality_was_measured_with():
+    assert map_sizes(200.0, 0.001, FINAL).smooth == FINAL.map_size
+    assert map_sizes(200.0, None, DRAFT).smooth == DRAFT.map_size
+    assert map_sizes(200.0, 1.0, FINAL).smooth == 256  # 200 pixels
+    assert map_sizes(0.0, 1.0, DRAFT).smooth == DRAFT.map_size

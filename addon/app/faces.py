@@ -1,0 +1,36 @@
+"""Faces that need no Blender: the example heads as the maps see them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import sanguine_core
+
+from ..domain.head import Head, build_head, load_presets, load_regions
+from ..domain.resources import rigs_path
+from .maps import Surface
+
+
+def example_head(head_id: str) -> Head:
+    """A head of `rigs/heads.toml`. Raises HeadError when its package is not installed."""
+    preset = load_presets(rigs_path("heads.toml"))[head_id]
+    return build_head(preset, load_regions(rigs_path("regions.toml")), _read_top_down)
+
+
+def head_surface(head: Head) -> Surface:
+    """The skin of a head, its quads as triangles."""
+    skin = head.part("skin")
+    corner = np.arange(skin.faces.size, dtype=np.int32).reshape(-1, 4)
+    triangles = np.concatenate([corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]])
+    return Surface(
+        position_mm=skin.vertices * np.float32(1000.0),
+        uv=np.ascontiguousarray(skin.uv.reshape(-1, 2), dtype=np.float32),
+        triangles=np.ascontiguousarray(triangles, dtype=np.int32),
+        corner_vertex=np.ascontiguousarray(skin.faces.ravel(), dtype=np.int32),
+        regions=head.regions,
+    )
+
+
+def _read_top_down(path: Path) -> np.ndarray:
+    return sanguine_core.read_image(str(path))[::-1]
