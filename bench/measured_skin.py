@@ -60,6 +60,10 @@ class Archive:
     site: np.ndarray
     nm: np.ndarray
     reflectance: np.ndarray
+    study: np.ndarray  # where and by whom: one instrument
+    person: np.ndarray  # an id within the archive
+    sex: np.ndarray  # "F", "M" or ""
+    age_group: np.ndarray  # 1 to 6: below 20, 20-29, ..., 60 and more; 0 where not recorded
 
     def groups(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """(records, columns within 380-780 nm) of every set of wavelengths."""
@@ -81,12 +85,17 @@ def read_archive() -> Archive:
     next(rows)
     header = next(rows)
     columns = [k for k, cell in enumerate(header) if isinstance(cell, int) and 360 <= cell <= 780]
-    site, reflectance = [], []
+    reflectance, of = [], []
     for row in rows:
         if isinstance(row[0], int) and row[8] == "SCI":
-            site.append(codes[int(row[6])])
+            study, subject, ethnicity, sex, age, site = row[1:7]
             reflectance.append([np.nan if row[k] in (None, "") else row[k] / 100 for k in columns])
-    return Archive(np.array(site), np.array([float(header[k]) for k in columns]), np.array(reflectance))
+            # Studies number their subjects anew, some of them once per group.
+            person = f"{study}/{subject}/{ethnicity}"
+            of.append((codes[int(site)], int(study), person, (sex or "").strip(), int(age or 0)))
+    site, study, person, sex, age = (np.array(column) for column in zip(*of, strict=True))
+    nm = np.array([float(header[k]) for k in columns])
+    return Archive(site, nm, np.array(reflectance), study, person, sex, age)
 
 
 def lab(reflectance: np.ndarray, nm: np.ndarray, light: str) -> np.ndarray:

@@ -7,6 +7,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,7 +15,6 @@ import sanguine_core
 
 from ..domain.errors import InputError
 from ..domain.files import atomic, read_json, write_json
-from ..domain.parameters import skin_from
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice, Settings
 from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
@@ -113,8 +113,9 @@ def _render(
 def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings) -> dict[str, Any]:
     return {
         "head": subject.rig.head,
-        "skin": skin_from(subject.skin, "skin"),
-        "effects": dict(shot.effects),
+        "skin": subject.whole_skin(),
+        "effects": subject.strengths(shot.effects),
+        "growth": asdict(subject.growth),
         "pose": pose_of(shot, job).model_dump(exclude={"id", "frame"}),
         "light": shot.light.model_dump(),
         "camera": shot.camera.model_dump(),

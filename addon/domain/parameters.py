@@ -60,8 +60,8 @@ def check_value(parameter: Parameter, value: Any, where: str) -> float:
     return float(value)
 
 
-def skin_from(values: Mapping[str, Any], where: str) -> dict[str, float]:
-    """A whole skin from some of its values; what is missing takes the schema's default.
+def skin_from(values: Mapping[str, Any], where: str, base: Skin | None = None) -> dict[str, float]:
+    """A whole skin from some of its values; what is missing is as in `base`, else the schema's default.
 
     The pair `oxyhemoglobin`, `deoxyhemoglobin` is taken instead of `hemoglobin`, `oxygenation`.
     Raises InputError, one line that begins with `where`.
@@ -69,7 +69,7 @@ def skin_from(values: Mapping[str, Any], where: str) -> dict[str, float]:
     values = dict(values)
     if OXY in values or DEOXY in values:
         _unpair(values, where)
-    skin = default_skin()
+    skin = default_skin() if base is None else dict(base)
     for key, value in values.items():
         if key not in PARAMETERS:
             raise InputError(f"{where}: {key}: unknown key, {nearest(key, [*PARAMETERS, OXY, DEOXY])}")

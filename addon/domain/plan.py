@@ -102,9 +102,12 @@ def default_strengths() -> dict[str, float]:
     return {effect.id: effect.default_strength for effect in EFFECTS if effect.default_strength is not None}
 
 
-def check_strengths(given: Mapping[str, float], where: str) -> dict[str, float]:
-    """Strengths with defaults filled in. Raises InputError for an effect that has none or a value beyond 0-1."""
-    strengths = default_strengths()
+def check_strengths(given: Mapping[str, float], where: str, base: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Strengths; what is missing is as in `base`, else the default.
+
+    Raises InputError for an effect that has no strength of its own or a value beyond 0-1.
+    """
+    strengths = default_strengths() | dict(base or {})
     for key, value in given.items():
         if key not in strengths:
             raise InputError(f"{where}: {key}: no effect with a strength of its own, {nearest(key, strengths)}")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import pydantic
 
-from .effects import Frame, Scene
+from . import people
+from .effects import Frame, Growth, Scene
 from .errors import InputError, nearest
 from .facs import ACTION_UNITS, EMOTIONS
 from .files import read_toml, validate
@@ -51,12 +53,39 @@ class Rig(_Table):
         return value
 
 
+class Individual(_Table):
+    """Who somebody is: from this come skin, features and their strengths, where the file does not name them itself."""
+
+    tone: Annotated[str, pydantic.AfterValidator(people.check_tone)]
+    sex: Literal[tuple(people.SEXES)] = "female"
+    age: Annotated[float, pydantic.Field(ge=people.AGES[0], le=people.AGES[1])] = 30.0
+    seed: Annotated[int, pydantic.Field(ge=people.SEEDS[0], le=people.SEEDS[1])] = 0
+    sun: Fraction = 0.5
+
+    @property
+    def person(self) -> people.Person:
+        return people.person(self.tone, self.sex, self.age, self.seed, self.sun)
+
+
 class Subject(_Table):
-    """One person: a rig and a skin. A shot has several, or one by its top-level `rig` and `skin`."""
+    """One person: a rig and a skin. A shot has several, or one by its top-level `rig`, `person` and `skin`."""
 
     id: Id
     rig: Rig
+    person: Individual | None = None
     skin: dict[str, float] = {}
+
+    def whole_skin(self, where: str = "skin") -> dict[str, float]:
+        """Every parameter: what `skin` names, else the person's, else the schema's default. Raises InputError."""
+        return skin_from(self.skin, where, self.person.person.skin if self.person else None)
+
+    def strengths(self, effects: Mapping[str, float], where: str = "effects") -> dict[str, float]:
+        """Of every effect: what the shot's `effects` names, else the person's, else the default. Raises InputError."""
+        return check_strengths(effects, where, self.person.person.strengths if self.person else None)
+
+    @property
+    def growth(self) -> Growth:
+        return self.person.person.growth if self.person else Growth()
 
 
 class Pose(_Table):
@@ -131,6 +160,7 @@ class Shot(_Table):
     """A whole SHOT.toml."""
 
     rig: Rig | None = None
+    person: Individual | None = None
     skin: dict[str, float] = {}
     effects: dict[str, float] = {}
     subject: list[Subject] = []
@@ -160,7 +190,7 @@ class Shot(_Table):
         if self.subject:
             return self.subject
         assert self.rig is not None  # read_shot saw to it
-        return [Subject(id="subject", rig=self.rig, skin=self.skin)]
+        return [Subject(id="subject", rig=self.rig, person=self.person, skin=self.skin)]
 
 
 class Job(_Table):
@@ -178,6 +208,8 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
     if bool(shot.subject) == (shot.rig is not None):
         raise InputError(f"{path}: rig: give one [rig] with its [skin], or [[subject]] tables, not "
                          + ("both" if shot.subject else "neither"))
+    if shot.subject and shot.person:
+        raise InputError(f"{path}: person: give it to the [[subject]] tables, each its own")
     if bool(shot.expression) == (shot.timeline is not None):
         raise InputError(f"{path}: expression: give [[expression]] tables or one [timeline], not "
                          + ("both" if shot.expression else "neither"))
@@ -188,7 +220,7 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
                 raise InputError(f"{path}: {key}: two have the id '{item.id}'")
             seen.add(item.id)
     for subject in shot.subjects:
-        skin_from(subject.skin, f"{path}: skin" if not shot.subject else f"{path}: subject {subject.id}: skin")
+        subject.whole_skin(f"{path}: skin" if not shot.subject else f"{path}: subject {subject.id}: skin")
     check_strengths(shot.effects, f"{path}: effects")
     if shot.timeline and shot.timeline.last < shot.timeline.first:
         raise InputError(f"{path}: timeline.last: {shot.timeline.last} is before the first frame, {shot.timeline.first}")
@@ -261,8 +293,9 @@ def scene_of(shot: Shot, subject: Subject, regions: tuple[str, ...]) -> Scene:
         emotions = {name: value for name, value in pose.emotions.items() if value > 0.0}
         frames.append(Frame(job.id, emotions, pose.blood))
     return Scene(
-        skin=skin_from(subject.skin, "skin"),
+        skin=subject.whole_skin(),
         frames=tuple(frames),
-        strengths=check_strengths(shot.effects, "effects"),
+        strengths=subject.strengths(shot.effects),
         regions=regions,
+        growth=subject.growth,
     )
