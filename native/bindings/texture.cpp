@@ -1,4 +1,6 @@
 // Images, chromophore maps and the UV raster.
+#include <array>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +18,8 @@
 #include "sanguine/exr_map.hpp"
 #include "sanguine/image.hpp"
 #include "sanguine/raster.hpp"
+#include "sanguine/row_reader.hpp"
+#include "sanguine/texture_file.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -82,6 +86,131 @@ std::optional<sanguine::PixelType> pixel_type_named(const std::optional<std::str
     throw std::invalid_argument("pixel_type: '" + *name + "' is not one of uint8, uint16, half, float");
 }
 
+/// A RowReader that can be closed; the file is let go with the last reference otherwise.
+class PyRowReader {
+public:
+    explicit PyRowReader(const fs::path& path) {
+        nb::gil_scoped_release release;
+        reader_.emplace(path);
+    }
+    const sanguine::RowReader& open() const {
+        if (!reader_) throw std::invalid_argument("RowReader: the file is closed");
+        return *reader_;
+    }
+    PixelsOut read_rows(int first, int count) {
+        const auto channels = int(open().channels().size());
+        if (count < 1 || count > open().height())
+            throw std::invalid_argument("read_rows: 1 to " + std::to_string(open().height()) + " rows are allowed, not " +
+                                        std::to_string(count));
+        sanguine::Image rows(open().width(), count, channels);
+        {
+            nb::gil_scoped_release release;
+            std::lock_guard lock(mutex_);
+            reader_->read_rows(first, count, {rows.pixels.get(), rows.size()});
+        }
+        return to_numpy(std::move(rows));
+    }
+    void close() { reader_.reset(); }
+
+private:
+    std::optional<sanguine::RowReader> reader_;
+    std::mutex mutex_;
+};
+
+/// A MapWriter that ends with its `with` block: committed, or abandoned after an exception.
+class PyMapWriter {
+public:
+    PyMapWriter(const fs::path& path, int width, int height, const std::vector<std::string>& channels,
+                const sanguine::ExrAttributes& attributes, bool half, bool from_top)
+        : shape_{std::size_t(width), channels.size()} {
+        writer_.emplace(path, width, height, channels, attributes, half,
+                        from_top ? sanguine::RowOrder::from_top : sanguine::RowOrder::from_bottom);
+    }
+    sanguine::MapWriter& open() {
+        if (!writer_) throw std::invalid_argument("MapWriter: the file is committed or abandoned");
+        return *writer_;
+    }
+    void write_rows(const PixelsIn& rows) {
+        if (rows.shape(1) != shape_[0] || rows.shape(2) != shape_[1])
+            throw std::invalid_argument("write_rows: rows of " + std::to_string(shape_[0]) + " x " +
+                                        std::to_string(shape_[1]) + " values are wanted, not of " +
+                                        std::to_string(rows.shape(1)) + " x " + std::to_string(rows.shape(2)));
+        sanguine::MapWriter& writer = open();
+        nb::gil_scoped_release release;
+        std::lock_guard lock(mutex_);
+        writer.write_rows({rows.data(), rows.size()});
+    }
+    void commit() {
+        sanguine::MapWriter& writer = open();
+        {
+            nb::gil_scoped_release release;
+            std::lock_guard lock(mutex_);
+            writer.commit();
+        }
+        writer_.reset();
+    }
+    void abandon() { writer_.reset(); }
+    bool is_open() const { return writer_.has_value(); }
+
+private:
+    std::optional<sanguine::MapWriter> writer_;
+    std::array<std::size_t, 2> shape_;  // width, channels
+    std::mutex mutex_;
+};
+
+void bind_rows(nb::module_& m) {
+    nb::class_<PyRowReader>(m, "RowReader", R"(A picture of any format, some rows at a time; a context manager.
+
+read_rows(first, count) gives (count, W, C) float32, row 0 of the picture at the bottom, values as stored. Any rows in
+any order; from the top down is cheapest, since files are decoded from there, and rows of the answer before are not
+read again (a halo costs nothing). Memory is that of the rows, rounded up to tiles, and what the format's decoder
+needs: interlaced PNG, progressive JPEG, GIF and WebP are whole pictures there. Raises ImageError.)")
+        .def(nb::init<const fs::path&>(), "path"_a)
+        .def_prop_ro("width", [](const PyRowReader& r) { return r.open().width(); })
+        .def_prop_ro("height", [](const PyRowReader& r) { return r.open().height(); })
+        .def_prop_ro("channels", [](const PyRowReader& r) { return r.open().channels(); }, "Names, in the file's order.")
+        .def_prop_ro("pixel_type", [](const PyRowReader& r) { return r.open().pixel_type(); },
+                     "uint8, uint16, half, float or another of OpenImageIO's names.")
+        .def_prop_ro(
+            "alpha_channel",
+            [](const PyRowReader& r) {
+                const int channel = r.open().alpha_channel();
+                return channel < 0 ? std::optional<int>() : channel;
+            },
+            "Index of the channel that is alpha, or None.")
+        .def("read_rows", &PyRowReader::read_rows, "first"_a, "count"_a)
+        .def("close", &PyRowReader::close)
+        .def("__enter__", [](nb::handle self) { return nb::borrow(self); })
+        .def("__exit__", [](PyRowReader& r, nb::args) { r.close(); });
+
+    nb::class_<PyMapWriter>(m, "MapWriter", R"(A chromophore map written some rows at a time; a context manager.
+
+The end of the `with` block commits, an exception in it abandons: the file appears whole or not at all.
+channels, attributes, half: as in write_exr_map. from_top: bands come from the top of the picture down, else from the
+bottom up; either way row 0 of each band is its lowest. Raises ImageError; ValueError for what does not fit.)")
+        .def(nb::init<const fs::path&, int, int, const std::vector<std::string>&, const sanguine::ExrAttributes&, bool,
+                      bool>(),
+             "path"_a, "width"_a, "height"_a, "channels"_a, "attributes"_a, "half"_a = true, "from_top"_a = false)
+        .def_prop_ro("rows_left", [](PyMapWriter& w) { return w.open().rows_left(); })
+        .def("write_rows", &PyMapWriter::write_rows, "rows"_a, "The next rows: (N, W, C) float32, finite.")
+        .def("commit", &PyMapWriter::commit, "Makes the file appear; rows must not be missing.")
+        .def("abandon", &PyMapWriter::abandon, "Leaves nothing behind.")
+        .def("__enter__", [](nb::handle self) { return nb::borrow(self); })
+        .def("__exit__", [](PyMapWriter& w, nb::handle type, nb::handle, nb::handle) {
+            if (!w.is_open()) return;
+            if (type.is_none()) {
+                try {
+                    w.commit();
+                } catch (...) {
+                    w.abandon();
+                    throw;
+                }
+            } else {
+                w.abandon();
+            }
+        }, "type"_a.none(), "value"_a.none(), "traceback"_a.none());
+}
+
 /// The wheel carries it beside the module.
 fs::path caption_font() {
     const auto module = nb::cast<fs::path>(nb::module_::import_("sanguine_core._core").attr("__file__"));
@@ -122,6 +251,28 @@ Triangles without area are skipped (`count_degenerate_uv` counts them), those ou
         },
         "uv"_a, "triangles"_a, nb::call_guard<nb::gil_scoped_release>(),
         "How many triangles have no area in UV space, or a coordinate that is not finite.");
+
+    m.def(
+        "uv_coverage",
+        [](const UvIn& uv, const TrianglesIn& triangles, int width, int height) {
+            if (width > sanguine::max_image_side || height > sanguine::max_image_side)
+                throw std::invalid_argument("uv_coverage: width and height are allowed from 1 to 16384");
+            sanguine::UvCoverage found;
+            {
+                nb::gil_scoped_release release;
+                found = sanguine::uv_coverage(points(uv), corners(triangles), width, height);
+            }
+            nb::dict answer;
+            answer["covered"] = found.covered;
+            answer["overlapping"] = found.overlapping;
+            answer["outside"] = found.outside;
+            return answer;
+        },
+        "uv"_a, "triangles"_a, "width"_a, "height"_a,
+        R"(How a UV layout fills the unit square, counted on the texels of a map of width x height.
+
+Returns a dict: covered (texels whose centre lies in a triangle), overlapping (in more than one; common edges do not
+count), outside (triangles with area and no point in the unit square).)");
 
     m.def(
         "read_image",
@@ -187,6 +338,42 @@ Raises ImageError (an OSError), or ValueError for names or values that do not fi
         R"(Read a chromophore map: (pixels, channel names, string attributes).
 
 Channels come in the file's order, which is alphabetical in every EXR. Raises ImageError (an OSError).)");
+
+    m.def(
+        "read_exr_map_info",
+        [](const fs::path& path) {
+            sanguine::ExrMapInfo info;
+            {
+                nb::gil_scoped_release release;
+                info = sanguine::read_exr_map_info(path);
+            }
+            return std::tuple(info.width, info.height, std::move(info.channels), std::move(info.attributes));
+        },
+        "path"_a, "The header of a chromophore map: (width, height, channel names, string attributes).");
+
+    bind_rows(m);
+
+    m.def("make_tx", &sanguine::make_tx, "source"_a, "destination"_a, nb::call_guard<nb::gil_scoped_release>(),
+          R"(Write `source` as a tiled, mip-mapped .tx texture; values are data, not colour managed.
+
+EXR inside for a source in EXR, else TIFF. The file appears whole or not at all. Raises ImageError (an OSError).)");
+
+    m.def(
+        "texture_info",
+        [](const fs::path& path) {
+            sanguine::TextureInfo info;
+            {
+                nb::gil_scoped_release release;
+                info = sanguine::texture_info(path);
+            }
+            nb::dict answer;
+            answer["tile_width"] = info.tile_width;
+            answer["tile_height"] = info.tile_height;
+            answer["levels"] = info.levels;
+            answer["mean"] = info.mean;
+            return answer;
+        },
+        "path"_a, "Of a picture, a dict: tile_width, tile_height (0 without tiles), levels, mean (from the level of one pixel).");
 
     m.def(
         "contact_sheet",

@@ -82,6 +82,82 @@ TEST_F(ExrMaps, RefusesToWriteWhatTheFileCannotHold) {
     EXPECT_THROW(write_exr_map(folder_ / "a.exr", {19, 11, 3, pixels_}, twice, {}, true), std::invalid_argument);
 }
 
+TEST_F(ExrMaps, BandsFromEitherEndMakeTheSamePicture) {
+    for (const RowOrder order : {RowOrder::from_bottom, RowOrder::from_top})
+        for (const int rows : {1, 4, 11}) {
+            MapWriter writer(folder_ / "a.exr", 19, 11, names_, {{"sanguine:units", "fraction"}}, false, order);
+            const std::size_t row = 19 * 3;
+            for (int done = 0; done < 11; done += rows) {
+                const int some = std::min(rows, 11 - done);
+                const int first = order == RowOrder::from_bottom ? done : 11 - done - some;
+                EXPECT_EQ(writer.rows_left(), 11 - done);
+                writer.write_rows({&pixels_[row * std::size_t(first)], row * std::size_t(some)});
+            }
+            EXPECT_FALSE(fs::exists(folder_ / "a.exr"));
+            writer.commit();
+            const ExrMap map = read_exr_map(folder_ / "a.exr");
+            EXPECT_EQ(map.channels, names_);
+            EXPECT_EQ(map.attributes.at("sanguine:units"), "fraction");
+            for (std::size_t i = 0; i < pixels_.size(); ++i) ASSERT_EQ(map.image.pixels[i], pixels_[i]) << rows;
+            fs::remove(folder_ / "a.exr");
+        }
+}
+
+TEST_F(ExrMaps, MoreRowsThanOneBlockAreKept) {
+    // 200 rows are written 64 at a time, in blocks of 16.
+    std::vector<float> pixels(3 * 200);
+    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = float(i);
+    const std::vector<std::string> name = {"melanin"};
+    for (const RowOrder order : {RowOrder::from_bottom, RowOrder::from_top}) {
+        MapWriter writer(folder_ / "a.exr", 3, 200, name, {}, true, order);
+        writer.write_rows(pixels);
+        writer.commit();
+        const ExrMap map = read_exr_map(folder_ / "a.exr");
+        for (std::size_t i = 0; i < pixels.size(); ++i) ASSERT_EQ(map.image.pixels[i], pixels[i]) << i;
+    }
+}
+
+TEST_F(ExrMaps, AnUnfinishedMapLeavesNothing) {
+    const std::vector<float> row(19 * 3, 0.5F), bad(19 * 3, std::numeric_limits<float>::quiet_NaN());
+    const auto start = [&] {
+        return MapWriter(folder_ / "a.exr", 19, 11, names_, {}, true, RowOrder::from_bottom);
+    };
+    {
+        MapWriter writer = start();
+        writer.write_rows(row);
+        EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // the temporary one
+    }
+    {
+        MapWriter writer = start();
+        EXPECT_THROW(writer.commit(), std::invalid_argument);
+        EXPECT_THROW(writer.write_rows(row), std::invalid_argument);
+    }
+    {
+        MapWriter writer = start();
+        EXPECT_THROW(writer.write_rows(bad), std::invalid_argument);
+        EXPECT_THROW(writer.commit(), std::invalid_argument);
+    }
+    {
+        MapWriter writer = start();
+        EXPECT_THROW(writer.write_rows({row.data(), row.size() - 1}), std::invalid_argument);
+    }
+    {
+        MapWriter writer = start();
+        EXPECT_THROW(writer.write_rows(std::vector<float>(19 * 3 * 12)), std::invalid_argument);
+    }
+    EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(ExrMaps, TheHeaderCanBeReadAlone) {
+    write(folder_ / "a.exr");
+    const ExrMapInfo info = read_exr_map_info(folder_ / "a.exr");
+    EXPECT_EQ(info.width, 19);
+    EXPECT_EQ(info.height, 11);
+    EXPECT_EQ(info.channels, names_);
+    EXPECT_EQ(info.attributes.at("sanguine:units"), "fraction");
+    EXPECT_THROW(read_exr_map_info(folder_ / "absent.exr"), ImageError);
+}
+
 TEST_F(ExrMaps, LeavesNothingBehindWhenItFails) {
     EXPECT_THROW(write(folder_ / "no such folder" / "a.exr"), ImageError);
     fs::create_directory(folder_ / "taken.exr");

@@ -110,6 +110,37 @@ TEST(Raster, SkipsAndCountsTrianglesWithoutArea) {
     EXPECT_EQ(count_degenerate_uv(sound.uv, sound.triangles), 0U);
 }
 
+TEST(Raster, NeighboursThatShareAnEdgeDoNotOverlap) {
+    // The diagonal of the square runs through centres of texels: they are covered, by one skin.
+    const Mesh whole = square(0, 1);
+    const UvCoverage coverage = uv_coverage(whole.uv, whole.triangles, 64, 64);
+    EXPECT_EQ(coverage.covered, 64U * 64U);
+    EXPECT_EQ(coverage.overlapping, 0U);
+    EXPECT_EQ(coverage.outside, 0U);
+}
+
+TEST(Raster, OverlapsAreCountedTexelByTexelWhateverTheWinding) {
+    Mesh mesh = square(0, 0.5F);
+    mesh.uv.insert(mesh.uv.end(), {{0.25F, 0.25F}, {0.75F, 0.25F}, {0.75F, 0.75F}, {0.25F, 0.75F}});
+    mesh.triangles.insert(mesh.triangles.end(), {{4, 6, 5}, {4, 7, 6}});  // mirrored
+    const UvCoverage coverage = uv_coverage(mesh.uv, mesh.triangles, 64, 64);
+    EXPECT_EQ(coverage.covered, 2U * 32 * 32 - 16 * 16);
+    // The mirrored square's diagonal meets the other one's: 16 centres lie on edges of both, hence in neither.
+    EXPECT_EQ(coverage.overlapping, 16U * 16 - 16);
+}
+
+TEST(Raster, TrianglesBesideTheSquareAreCounted) {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::vector<glm::vec2> uv = {{1, 0}, {2, 0}, {2, 1}, {0, 0}, {1e30F, 0}, {0, 1e30F}, {nan, 0}};
+    const std::vector<glm::uvec3> triangles = {{0, 1, 2}, {3, 4, 5}, {3, 4, 6}, {3, 3, 4}};
+    const UvCoverage coverage = uv_coverage(uv, triangles, 8, 8);
+    EXPECT_EQ(coverage.outside, 1U);
+    EXPECT_EQ(coverage.covered, 64U);
+    const std::vector<glm::uvec3> wrong = {{0, 1, 7}};
+    EXPECT_THROW(uv_coverage(uv, wrong, 8, 8), std::invalid_argument);
+    EXPECT_THROW(uv_coverage(uv, triangles, 0, 8), std::invalid_argument);
+}
+
 TEST(Raster, ClipsWhatLiesOutsideTheImage) {
     const auto pixels = draw(square(-1e12F, 1e12F), 8, 8, 4);
     for (const float p : pixels) EXPECT_NE(p, nothing);

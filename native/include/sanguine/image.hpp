@@ -14,6 +14,8 @@ namespace sanguine {
 
 inline constexpr int max_image_side = 16384;
 inline constexpr int max_image_channels = 64;
+/// Of a picture that is held as a whole: 16384 squared with 4 channels, 4 GiB of floats. Larger ones go by in rows.
+inline constexpr std::size_t max_image_values = std::size_t(1) << 30;
 
 /// A file that cannot be read or written. The message is one line and names the file.
 class ImageError : public std::runtime_error {

@@ -39,4 +39,14 @@ void rasterize_uv(const UvMesh& mesh, int padding_px, std::span<const float> fil
 /// How many triangles have no area in UV space, or a coordinate that is not finite: those that are skipped.
 std::size_t count_degenerate_uv(std::span<const glm::vec2> uv, std::span<const glm::uvec3> triangles);
 
+/// How a UV layout fills the unit square, counted on the texels of a map.
+struct UvCoverage {
+    std::size_t covered = 0;      ///< texels whose centre lies in a triangle
+    std::size_t overlapping = 0;  ///< those whose centre lies in more than one: two places of the skin share them
+    std::size_t outside = 0;      ///< triangles with area and without a point in the unit square
+};
+
+/// An edge that two triangles share is no overlap. Throws std::invalid_argument.
+UvCoverage uv_coverage(std::span<const glm::vec2> uv, std::span<const glm::uvec3> triangles, int width, int height);
+
 }  // namespace sanguine

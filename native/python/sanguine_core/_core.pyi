@@ -170,6 +170,14 @@ def count_degenerate_uv(uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 
     How many triangles have no area in UV space, or a coordinate that is not finite.
     """
 
+def uv_coverage(uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], width: int, height: int) -> dict:
+    """
+    How a UV layout fills the unit square, counted on the texels of a map of width x height.
+
+    Returns a dict: covered (texels whose centre lies in a triangle), overlapping (in more than one; common edges do not
+    count), outside (triangles with area and no point in the unit square).
+    """
+
 def read_image(path: str | os.PathLike) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]:
     """
     Read a picture as (H, W, C) float32, row 0 at the bottom, values as stored (8 bits divided by 255).
@@ -205,6 +213,88 @@ def read_exr_map(path: str | os.PathLike) -> tuple[Annotated[NDArray[numpy.float
     Read a chromophore map: (pixels, channel names, string attributes).
 
     Channels come in the file's order, which is alphabetical in every EXR. Raises ImageError (an OSError).
+    """
+
+def read_exr_map_info(path: str | os.PathLike) -> tuple[int, int, list[str], dict[str, str]]:
+    """
+    The header of a chromophore map: (width, height, channel names, string attributes).
+    """
+
+class RowReader:
+    """
+    A picture of any format, some rows at a time; a context manager.
+
+    read_rows(first, count) gives (count, W, C) float32, row 0 of the picture at the bottom, values as stored. Any rows in
+    any order; from the top down is cheapest, since files are decoded from there, and rows of the answer before are not
+    read again (a halo costs nothing). Memory is that of the rows, rounded up to tiles, and what the format's decoder
+    needs: interlaced PNG, progressive JPEG, GIF and WebP are whole pictures there. Raises ImageError.
+    """
+
+    def __init__(self, path: str | os.PathLike) -> None: ...
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def height(self) -> int: ...
+
+    @property
+    def channels(self) -> list[str]:
+        """Names, in the file's order."""
+
+    @property
+    def pixel_type(self) -> str:
+        """uint8, uint16, half, float or another of OpenImageIO's names."""
+
+    @property
+    def alpha_channel(self) -> int | None:
+        """Index of the channel that is alpha, or None."""
+
+    def read_rows(self, first: int, count: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]: ...
+
+    def close(self) -> None: ...
+
+    def __enter__(self) -> object: ...
+
+    def __exit__(self, *args) -> None: ...
+
+class MapWriter:
+    """
+    A chromophore map written some rows at a time; a context manager.
+
+    The end of the `with` block commits, an exception in it abandons: the file appears whole or not at all.
+    channels, attributes, half: as in write_exr_map. from_top: bands come from the top of the picture down, else from the
+    bottom up; either way row 0 of each band is its lowest. Raises ImageError; ValueError for what does not fit.
+    """
+
+    def __init__(self, path: str | os.PathLike, width: int, height: int, channels: Sequence[str], attributes: Mapping[str, str], half: bool = True, from_top: bool = False) -> None: ...
+
+    @property
+    def rows_left(self) -> int: ...
+
+    def write_rows(self, rows: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)]) -> None:
+        """The next rows: (N, W, C) float32, finite."""
+
+    def commit(self) -> None:
+        """Makes the file appear; rows must not be missing."""
+
+    def abandon(self) -> None:
+        """Leaves nothing behind."""
+
+    def __enter__(self) -> object: ...
+
+    def __exit__(self, type: object | None, value: object | None, traceback: object | None) -> None: ...
+
+def make_tx(source: str | os.PathLike, destination: str | os.PathLike) -> None:
+    """
+    Write `source` as a tiled, mip-mapped .tx texture; values are data, not colour managed.
+
+    EXR inside for a source in EXR, else TIFF. The file appears whole or not at all. Raises ImageError (an OSError).
+    """
+
+def texture_info(path: str | os.PathLike) -> dict:
+    """
+    Of a picture, a dict: tile_width, tile_height (0 without tiles), levels, mean (from the level of one pixel).
     """
 
 def contact_sheet(paths: Sequence[str | os.PathLike], captions: Sequence[str], out_path: str | os.PathLike, columns: int = 5, gap_px: int = 8, background: float = 0.10000000149011612) -> None:

@@ -100,4 +100,48 @@ std::size_t count_degenerate_uv(std::span<const glm::vec2> uv, std::span<const g
     }));
 }
 
+UvCoverage uv_coverage(std::span<const glm::vec2> uv, std::span<const glm::uvec3> triangles, int width, int height) {
+    if (width < 1 || height < 1) throw std::invalid_argument("uv_coverage: the image has no pixels");
+    const glm::dvec2 size(width, height);
+    const auto in_pixels = [&](glm::uvec3 corner) {
+        UvTriangle t = corners_of(uv, corner);
+        for (glm::dvec2& point : t) point *= size;
+        return t;
+    };
+    UvCoverage coverage;
+    for (const glm::uvec3 corner : triangles) {
+        if (std::max({corner.x, corner.y, corner.z}) >= uv.size())
+            throw std::invalid_argument("uv_coverage: a triangle names a corner that does not exist");
+        if (is_degenerate(corners_of(uv, corner))) continue;
+        const UvTriangle t = in_pixels(corner);
+        const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
+        const auto [low, high] = std::minmax({t[0].y, t[1].y, t[2].y});
+        if (right <= 0 || high <= 0 || left >= size.x || low >= size.y) ++coverage.outside;
+    }
+
+    // In pixels. Corners on a common edge may differ by the rounding of a float, 2^-24 of 16384 pixels at most.
+    constexpr double inside_edge = 0.01;
+    enum : std::uint8_t { untouched, on_edge, inside, twice };
+    std::vector<std::uint8_t> state(std::size_t(width) * std::size_t(height), untouched);
+    std::size_t current = triangles.size();
+    glm::dvec3 altitude(0);  // of each corner over the edge opposite to it
+    UvBand(uv, triangles, width, height, 0, height).draw(0, [&](int x, int y, std::uint32_t triangle, glm::dvec3 b) {
+        if (triangle != current) {
+            current = triangle;
+            const UvTriangle t = in_pixels(triangles[triangle]);
+            altitude = std::abs(twice_area(t)) /
+                       glm::dvec3(glm::length(t[2] - t[1]), glm::length(t[0] - t[2]), glm::length(t[1] - t[0]));
+        }
+        const double depth = std::min({b.x * altitude.x, b.y * altitude.y, b.z * altitude.z});
+        std::uint8_t& texel = state[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+        if (depth <= inside_edge)
+            texel = std::max<std::uint8_t>(texel, on_edge);
+        else
+            texel = texel < inside ? inside : twice;
+    });
+    coverage.covered = std::size_t(std::ranges::count_if(state, [](std::uint8_t s) { return s != untouched; }));
+    coverage.overlapping = std::size_t(std::ranges::count(state, twice));
+    return coverage;
+}
+
 }  // namespace sanguine

@@ -1,7 +1,10 @@
 #include "sanguine/exr_map.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <limits>
 #include <set>
 
@@ -10,6 +13,7 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStdIO.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/openexr.h>
 #include <half.h>
@@ -72,92 +76,223 @@ private:
     std::string message_;
 };
 
-void validate_for_writing(const ImageView& image, std::span<const std::string> channels, bool half) {
-    const auto fail = [](const std::string& what) { throw std::invalid_argument("write_exr_map: " + what); };
-    if (image.width < 1 || image.height < 1 || image.width > max_image_side || image.height > max_image_side)
-        fail("the image is " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-             "; 1 to " + std::to_string(max_image_side) + " are allowed");
-    if (image.channels < 1 || image.channels > max_image_channels || channels.size() != std::size_t(image.channels))
-        fail(std::to_string(channels.size()) + " names for " + std::to_string(image.channels) + " channels (1 to " +
-             std::to_string(max_image_channels) + ")");
-    if (std::set<std::string>(channels.begin(), channels.end()).size() != channels.size())
-        fail("a channel name is used twice");
-    if (std::ranges::any_of(channels, [](const std::string& name) { return name.empty() || name.size() > 255; }))
-        fail("a channel name is empty or longer than 255 bytes");
+[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("write_exr_map: " + what); }
 
-    const float limit = half ? float(HALF_MAX) : std::numeric_limits<float>::max();
-    for (std::size_t i = 0; i < image.pixels.size(); ++i)
-        if (!(std::abs(image.pixels[i]) <= limit))  // so written, NaN fails as well
-            fail("channel '" + channels[i % channels.size()] + "' holds " + std::to_string(image.pixels[i]) +
-                 (half ? ", which half floats cannot" : ", which is not finite"));
+void check_layout(int width, int height, std::span<const std::string> channels) {
+    if (width < 1 || height < 1 || width > max_image_side || height > max_image_side)
+        refuse("the image is " + std::to_string(width) + " x " + std::to_string(height) + "; 1 to " +
+               std::to_string(max_image_side) + " are allowed");
+    if (channels.empty() || channels.size() > max_image_channels)
+        refuse("there are " + std::to_string(channels.size()) + " channels; 1 to " +
+               std::to_string(max_image_channels) + " are allowed");
+    if (std::set<std::string>(channels.begin(), channels.end()).size() != channels.size())
+        refuse("a channel name is used twice");
+    if (std::ranges::any_of(channels, [](const std::string& name) { return name.empty() || name.size() > 255; }))
+        refuse("a channel name is empty or longer than 255 bytes");
 }
 
-Imf::Header make_header(const ImageView& image, std::span<const std::string> channels,
-                        const ExrAttributes& attributes, Imf::PixelType type) {
-    Imf::Header header(image.width, image.height);
+void check_values(std::span<const float> values, std::span<const std::string> channels, bool half) {
+    const float limit = half ? float(HALF_MAX) : std::numeric_limits<float>::max();
+    const auto unfit = std::ranges::find_if(values, [limit](float value) {
+        return !(std::abs(value) <= limit);  // so written, NaN fails as well
+    });
+    if (unfit == values.end()) return;
+    const auto i = std::size_t(unfit - values.begin());
+    refuse("channel '" + channels[i % channels.size()] + "' holds " + std::to_string(*unfit) +
+           (half ? ", which half floats cannot" : ", which is not finite"));
+}
+
+Imf::Header make_header(int width, int height, std::span<const std::string> channels, const ExrAttributes& attributes,
+                        bool half, RowOrder order) {
+    Imf::Header header(width, height);
     header.compression() = Imf::ZIP_COMPRESSION;
-    for (const std::string& name : channels) header.channels().insert(name, Imf::Channel(type));
+    header.lineOrder() = order == RowOrder::from_top ? Imf::INCREASING_Y : Imf::DECREASING_Y;
+    for (const std::string& name : channels) header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
     for (const auto& [name, value] : attributes) header.insert(name, Imf::StringAttribute(value));
     return header;
 }
 
-/// Interleaved rows of `Value`, the first in memory being the top of the picture as OpenEXR wants it.
-template <typename Value>
-Imf::FrameBuffer frame_buffer(Value* top_row, int width, std::span<const std::string> channels, Imf::PixelType type) {
-    Imf::FrameBuffer buffer;
-    const std::size_t x_stride = sizeof(Value) * channels.size();
-    for (std::size_t i = 0; i < channels.size(); ++i)
-        buffer.insert(channels[i], Imf::Slice(type, reinterpret_cast<char*>(top_row + i), x_stride,
-                                              x_stride * std::size_t(width)));
-    return buffer;
-}
-
-template <typename Value>
-void write_pixels(const fs::path& path, const ImageView& image, std::span<const std::string> channels,
-                  const ExrAttributes& attributes, Imf::PixelType type) {
-    const std::size_t row = std::size_t(image.width) * channels.size();
-    std::vector<Value> flipped(row * std::size_t(image.height));
-    for (int y = 0; y < image.height; ++y)
-        std::transform(image.pixels.begin() + std::ptrdiff_t(row) * y,
-                       image.pixels.begin() + std::ptrdiff_t(row) * (y + 1),
-                       flipped.begin() + std::ptrdiff_t(row) * (image.height - 1 - y),
-                       [](float value) { return Value(value); });
-    Imf::OutputFile file(path.c_str(), make_header(image, channels, attributes, type));
-    file.setFrameBuffer(frame_buffer(flipped.data(), image.width, channels, type));
-    file.writePixels(image.height);
+ExrMapInfo info_of(const Imf::Header& header) {
+    ExrMapInfo info;
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
+        info.channels.emplace_back(channel.name());
+    for (auto attribute = header.begin(); attribute != header.end(); ++attribute)
+        if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute.attribute()))
+            info.attributes.emplace(attribute.name(), text->value());
+    const Imath::Box2i window = header.dataWindow();
+    info.width = window.max.x - window.min.x + 1;
+    info.height = window.max.y - window.min.y + 1;
+    return info;
 }
 
 }  // namespace
 
+class MapWriter::Impl {
+public:
+    Impl(const fs::path& path, int width, int height, std::span<const std::string> channels,
+         const ExrAttributes& attributes, bool as_half, RowOrder order)
+        : path_(path),
+          width_(width),
+          height_(height),
+          channels_(channels.begin(), channels.end()),
+          half_(as_half),
+          order_(order),
+          file_(path) {
+        check_layout(width, height, channels);
+        // A stream of our own: OpenEXR's says nothing of what fails when it is closed.
+        bytes_.open(file_.temporary(), std::ios::binary);
+        if (!bytes_) throw ImageError(path, std::string("cannot be written: ") + std::strerror(errno));
+        guarded([&] {
+            stream_ = std::make_unique<Imf::StdOFStream>(bytes_, file_.temporary().c_str());
+            output_ = std::make_unique<Imf::OutputFile>(
+                *stream_, make_header(width, height, channels, attributes, as_half, order), 0);
+        });
+    }
+    ~Impl() {
+        // OpenEXR completes the file in its destructors; by then nobody wants it.
+        output_.reset();
+        stream_.reset();
+    }
+
+    int rows_left() const { return height_ - written_; }
+
+    void write_rows(std::span<const float> rows) {
+        if (!output_) refuse("nothing can be written after a commit or an error");
+        const std::size_t row = std::size_t(width_) * channels_.size();
+        const int count = int(std::min(rows.size() / row, std::size_t(max_image_side) + 1));
+        if (rows.size() % row != 0 || count > rows_left())
+            abandon([&] {
+                refuse(path_.string() + ": " + std::to_string(rows.size()) + " values are not 1 to " +
+                       std::to_string(rows_left()) + " rows of " + std::to_string(row));
+            });
+        abandon([&] { check_values(rows, channels_, half_); });
+        // Few at a time, so that the copy in the file's type stays small: whole blocks of OpenEXR's ZIP compression.
+        constexpr int chunk = 64;
+        for (int done = 0; done < count; done += chunk) {
+            const int some = std::min(chunk, count - done);
+            const int lowest = order_ == RowOrder::from_bottom ? done : count - done - some;
+            const auto part = rows.subspan(row * std::size_t(lowest), row * std::size_t(some));
+            abandon([&] {
+                guarded([&] {
+                    if (half_)
+                        write<::half>(part, some, Imf::HALF);
+                    else
+                        write<float>(part, some, Imf::FLOAT);
+                });
+            });
+        }
+    }
+
+    void commit() {
+        if (!output_) refuse("nothing can be committed after a commit or an error");
+        if (rows_left() > 0)
+            abandon([&] {
+                refuse(path_.string() + ": " + std::to_string(rows_left()) + " of " + std::to_string(height_) +
+                       " rows are missing");
+            });
+        output_.reset();
+        stream_.reset();
+        bytes_.close();
+        if (!bytes_) throw ImageError(path_, "cannot be written: the disk may be full");
+        file_.commit();
+    }
+
+private:
+    /// What goes wrong in `work` ends the writing.
+    template <typename Work> void abandon(Work work) {
+        try {
+            work();
+        } catch (...) {
+            output_.reset();
+            throw;
+        }
+    }
+
+    /// OpenEXR's errors name the temporary file: they are told of the one that was asked for.
+    template <typename Work> void guarded(Work work) {
+        try {
+            work();
+        } catch (const std::exception& error) {
+            throw ImageError(path_, std::string("cannot be written: ") + error.what());
+        }
+    }
+
+    template <typename Value> void write(std::span<const float> rows, int count, Imf::PixelType type) {
+        const std::size_t row = std::size_t(width_) * channels_.size();
+        // In the file's order, the top row first; it stays alive until they are written.
+        std::vector<Value> flipped(rows.size());
+        for (int y = 0; y < count; ++y)
+            std::transform(rows.begin() + std::ptrdiff_t(row) * y, rows.begin() + std::ptrdiff_t(row) * (y + 1),
+                           flipped.begin() + std::ptrdiff_t(row) * (count - 1 - y),
+                           [](float value) { return Value(value); });
+        const int top = order_ == RowOrder::from_top ? written_ : height_ - written_ - count;
+        // The slices point at where line 0 would be.
+        Value* line0 = flipped.data() - std::ptrdiff_t(row) * top;
+        const std::size_t x_stride = sizeof(Value) * channels_.size();
+        Imf::FrameBuffer buffer;
+        for (std::size_t i = 0; i < channels_.size(); ++i)
+            buffer.insert(channels_[i], Imf::Slice(type, reinterpret_cast<char*>(line0 + i), x_stride,
+                                                   x_stride * std::size_t(width_)));
+        output_->setFrameBuffer(buffer);
+        output_->writePixels(count);
+        written_ += count;
+    }
+
+    fs::path path_;
+    int width_, height_;
+    std::vector<std::string> channels_;
+    bool half_;
+    RowOrder order_;
+    AtomicFile file_;
+    std::ofstream bytes_;
+    std::unique_ptr<Imf::StdOFStream> stream_;
+    std::unique_ptr<Imf::OutputFile> output_;
+    int written_ = 0;
+};
+
+MapWriter::MapWriter(const fs::path& path, int width, int height, std::span<const std::string> channels,
+                     const ExrAttributes& attributes, bool as_half, RowOrder order)
+    : impl_(std::make_unique<Impl>(path, width, height, channels, attributes, as_half, order)) {}
+MapWriter::~MapWriter() = default;
+MapWriter::MapWriter(MapWriter&&) noexcept = default;
+MapWriter& MapWriter::operator=(MapWriter&&) noexcept = default;
+
+int MapWriter::rows_left() const { return impl_->rows_left(); }
+void MapWriter::write_rows(std::span<const float> rows) { impl_->write_rows(rows); }
+void MapWriter::commit() { impl_->commit(); }
+
 void write_exr_map(const fs::path& path, const ImageView& image, std::span<const std::string> channels,
                    const ExrAttributes& attributes, bool half) {
-    validate_for_writing(image, channels, half);
-    AtomicFile file(path);
+    if (channels.size() != std::size_t(image.channels))
+        refuse(std::to_string(channels.size()) + " names for " + std::to_string(image.channels) + " channels (1 to " +
+               std::to_string(max_image_channels) + ")");
+    check_layout(image.width, image.height, channels);
+    check_values(image.pixels, channels, half);
+    MapWriter writer(path, image.width, image.height, channels, attributes, half, RowOrder::from_top);
+    writer.write_rows(image.pixels);
+    writer.commit();
+}
+
+ExrMapInfo read_exr_map_info(const fs::path& path) {
+    HeaderReader(path).validate();
     try {
-        if (half)
-            write_pixels<::half>(file.temporary(), image, channels, attributes, Imf::HALF);
-        else
-            write_pixels<float>(file.temporary(), image, channels, attributes, Imf::FLOAT);
+        return info_of(Imf::InputFile(path.c_str()).header());
     } catch (const std::exception& error) {
-        throw ImageError(path, std::string("cannot be written: ") + error.what());
+        throw ImageError(path, std::string("cannot be read: ") + error.what());
     }
-    file.commit();
 }
 
 ExrMap read_exr_map(const fs::path& path) {
     HeaderReader(path).validate();
     try {
         Imf::InputFile file(path.c_str());
-        const Imf::Header& header = file.header();
-        ExrMap map;
-        for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
-            map.channels.emplace_back(channel.name());
-        for (auto attribute = header.begin(); attribute != header.end(); ++attribute)
-            if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute.attribute()))
-                map.attributes.emplace(attribute.name(), text->value());
-
-        const Imath::Box2i window = header.dataWindow();
-        map.image = Image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, int(map.channels.size()));
+        ExrMapInfo info = info_of(file.header());
+        const Imath::Box2i window = file.header().dataWindow();
+        ExrMap map{{}, std::move(info.channels), std::move(info.attributes)};
+        if (std::size_t(info.width) * std::size_t(info.height) * map.channels.size() > max_image_values)
+            throw std::runtime_error("more than " + std::to_string(max_image_values) +
+                                     " values are not read at once");
+        map.image = Image(info.width, info.height, int(map.channels.size()));
         Image& image = map.image;
         const std::size_t row = image.row_size();
         std::vector<float> line(row);

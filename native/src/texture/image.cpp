@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <sstream>
 #include <vector>
 
 #include <OpenImageIO/imagebuf.h>
@@ -10,32 +11,27 @@
 #include <OpenImageIO/strutil.h>
 
 #include "atomic_file.hpp"
+#include "open_image.hpp"
 
 namespace sanguine {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string one_line(std::string text) {
-    std::ranges::replace(text, '\n', ' ');
-    while (!text.empty() && text.back() == ' ') text.pop_back();
-    return text;
-}
-
-/// Open for reading with the header held against the limits; alpha stays as the file has it.
-std::unique_ptr<OIIO::ImageInput> open_checked(const fs::path& path) {
-    OIIO::ImageSpec config;
-    config.attribute("oiio:UnassociatedAlpha", 1);
-    auto input = OIIO::ImageInput::open(path.string(), &config);
-    if (!input) throw ImageError(path, "cannot be read: " + OIIO::geterror());
-    const OIIO::ImageSpec& spec = input->spec();
-    if (spec.width < 1 || spec.height < 1 || spec.depth != 1 || spec.width > max_image_side ||
-        spec.height > max_image_side || spec.nchannels < 1 || spec.nchannels > max_image_channels)
-        throw ImageError(path, "is " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " x " +
-                                   std::to_string(spec.depth) + " with " + std::to_string(spec.nchannels) +
-                                   " channels; at most " + std::to_string(max_image_side) + " squared with " +
-                                   std::to_string(max_image_channels) + " channels are allowed");
-    return input;
+/// Libraries say the same once for each block of a file, in lines, with bytes of a broken header in them.
+std::string one_line(const std::string& text) {
+    std::vector<std::string> said;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        std::ranges::replace_if(line, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+        while (!line.empty() && line.back() == ' ') line.pop_back();
+        if (!line.empty() && std::ranges::find(said, line) == said.end()) said.push_back(line);
+    }
+    std::string joined;
+    for (const std::string& line : said) joined += (joined.empty() ? "" : "; ") + line;
+    constexpr std::size_t longest = 400;
+    if (joined.size() > longest) joined = joined.substr(0, longest) + "...";
+    return joined;
 }
 
 /// `top_row` is where the file's first row goes; a negative stride turns the picture over.
@@ -89,6 +85,7 @@ struct Picture {
 Picture read_picture(const fs::path& path) {
     const auto input = open_checked(path);
     const OIIO::ImageSpec& spec = input->spec();
+    check_fits_memory(path, spec);
     const auto channels = std::size_t(spec.nchannels);
     std::vector<std::uint8_t> all(spec.image_pixels() * channels);
     read_pixels(*input, path, OIIO::TypeUInt8, all.data(), OIIO::AutoStride);
@@ -107,6 +104,7 @@ ImageError::ImageError(const fs::path& path, const std::string& what)
 Image read_image(const fs::path& path) {
     const auto input = open_checked(path);
     const OIIO::ImageSpec& spec = input->spec();
+    check_fits_memory(path, spec);
     Image image(spec.width, spec.height, spec.nchannels);
     const auto row = OIIO::stride_t(image.row_size() * sizeof(float));
     read_pixels(*input, path, OIIO::TypeFloat, image.pixels.get() + image.row_size() * std::size_t(spec.height - 1),
