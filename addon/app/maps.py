@@ -15,6 +15,7 @@ import sanguine_core
 
 from ..domain.blood import ANATOMY, Rest
 from ..domain.effects import Growth, anatomy
+from ..domain.effects.grown import MAPS as GROWN
 from ..domain.effects.regions import region_images
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes
@@ -23,13 +24,6 @@ from .map_cache import MapCache, key_of
 
 # Texels that repeat a UV island's edge outward, so that filtering never meets the background.
 _PADDING = 16
-
-GROWN = {
-    "grown": ("log_hemoglobin", "log_melanin", "log_oil", "oxygenation"),
-    "grown_ink": ("ink_per_mm",),
-    "grown_height": ("height_mm",),
-}
-"""Map id -> what its channels hold: sums over the features' layers."""
 
 Progress = Callable[[int, int], bool]
 

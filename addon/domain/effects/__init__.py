@@ -1,16 +1,19 @@
 """The effects, each declared in its module and listed here once, in the order in which they act."""
 
-from . import anatomy, mottle, oil, oxygenation, perfusion, relief, scattering
+from . import anatomy, grown, mottle, oil, oxygenation, perfusion, relief, residual, scattering, skin_map
 from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
 EFFECTS: tuple[Effect, ...] = (
     scattering.EFFECT,
     anatomy.EFFECT,
+    skin_map.EFFECT,  # after anatomy: what the map holds stands as it is
+    *grown.EFFECTS,  # before perfusion: blood comes on top of what has grown
     perfusion.EFFECT,
     oxygenation.EFFECT,
     mottle.EFFECT,  # after perfusion: a flush is blotchy too
     relief.EFFECT,
-    oil.EFFECT,
+    residual.EFFECT,
+    oil.EFFECT,  # after the residual: the film lies over brows and make-up too
 )
 
 __all__ = ["EFFECTS", "ELSEWHERE", "Activation", "Bounds", "Effect", "Fragment", "Frame", "Growth", "Scene", "ShaderInput"]

@@ -138,13 +138,16 @@ def shift_bounds(bounds: Bounds, chromophore: str, changes: Mapping[str, Interva
     return _mapped(bounds, chromophore, changes, (0.0, 0.0), lambda v, c: (v[0] + c[0], v[1] + c[1]))
 
 
-def _mapped(bounds, chromophore, by_region, neutral, combine) -> Bounds:
+def inside(chromophore: str, interval: Interval) -> Interval:
+    """`interval` cut to what the chromophore may be."""
     row = PARAMETERS[chromophore]
+    low, high = (min(max(v, row.hard_min), row.hard_max) for v in interval)
+    return low, high
 
-    def inside(interval: Interval) -> Interval:
-        low, high = (min(max(v, row.hard_min), row.hard_max) for v in interval)
-        return low, high
 
-    regions = bounds[chromophore]
-    changed = {name: inside(combine(value, by_region.get(name, neutral))) for name, value in regions.items()}
+def _mapped(bounds, chromophore, by_region, neutral, combine) -> Bounds:
+    changed = {
+        name: inside(chromophore, combine(value, by_region.get(name, neutral)))
+        for name, value in bounds[chromophore].items()
+    }
     return {**bounds, chromophore: changed}

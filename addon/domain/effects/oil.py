@@ -3,14 +3,21 @@
 import sanguine_core
 
 from ..film import ENTRIES, film_table
+from . import skin_map
 from .effect import Activation, Effect, Fragment, Scene, ShaderInput
 
 
 def _activate(scene: Scene) -> Activation:
+    frames = tuple(frame.id for frame in scene.frames)
+    if "oil" in skin_map.held(scene):
+        low, high = scene.maps[skin_map.MAP]["oil"]
+        if high <= 0.0:
+            return Activation(False, "oil is 0 in the skin map")
+        return Activation(True, f"oil is {low:g} to {high:g} in the skin map", frames)
     oil = scene.skin["oil"]
     if oil <= 0.0 and not scene.live:
         return Activation(False, "oil is 0")
-    return Activation(True, f"oil is {oil:g}", tuple(frame.id for frame in scene.frames))
+    return Activation(True, f"oil is {oil:g}", frames)
 
 
 def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
