@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
 import bpy
 import numpy as np
+import sanguine_core
+
+from ..domain.udim import FIRST_TILE
+
+Pixels = np.ndarray | Mapping[int, np.ndarray]
+"""(H, W, 1, 3 or 4) float32, row 0 lowest, or one such array per UDIM tile."""
+
+_CHANNELS = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+_TILE = "<UDIM>"
 
 
-def data_image(name: str, pixels: np.ndarray) -> bpy.types.Image:
-    """A packed float image of numbers, not colours. pixels: (H, W, 3 or 4), row 0 lowest."""
+def data_image(name: str, pixels: Pixels, half: bool = False) -> bpy.types.Image:
+    """A packed float image of numbers, not colours. half: kept as 16-bit floats, which round to 1 in 2000."""
+    if isinstance(pixels, Mapping) or half or pixels.shape[2] == 1:
+        return _from_files(name, pixels if isinstance(pixels, Mapping) else {FIRST_TILE: pixels}, half)
     height, width, channels = pixels.shape
     rgba = np.ones((height, width, 4), dtype=np.float32)
     rgba[..., :channels] = pixels
@@ -17,4 +32,32 @@ def data_image(name: str, pixels: np.ndarray) -> bpy.types.Image:
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     image.pack()
+    return image
+
+
+def _from_files(name: str, tiles: Mapping[int, np.ndarray], half: bool) -> bpy.types.Image:
+    """By way of EXR files, which are gone afterwards: Blender fills tiles other than the first from files alone, and
+    packs a file as it is."""
+    tiled = list(tiles) != [FIRST_TILE]
+    with tempfile.TemporaryDirectory() as folder:
+        for tile, pixels in tiles.items():
+            path = Path(folder) / (f"map.{tile}.exr" if tiled else "map.exr")
+            sanguine_core.write_exr_map(
+                path, np.ascontiguousarray(pixels, dtype=np.float32), _CHANNELS[pixels.shape[2]], {}, half=half
+            )
+        image = bpy.data.images.load(str(path))
+        image.name = name
+        image.colorspace_settings.is_data = True
+        image.alpha_mode = "CHANNEL_PACKED"
+        if tiled:
+            image.source = "TILED"  # finds the other tiles
+            image.filepath_raw = str(Path(folder) / f"map.{_TILE}.exr")
+            image.reload()
+            if missing := set(tiles) - {tile.number for tile in image.tiles}:
+                raise RuntimeError(f"{name}: Blender did not find the tiles {sorted(missing)}")
+        image.pack()
+    # No folder of this machine in the file.
+    image.filepath_raw = f"//{name}.{_TILE}.exr" if tiled else f"//{name}.exr"
+    for packed in image.packed_files:
+        packed.filepath = f"//{name}.{packed.tile_number}.exr" if tiled else f"//{name}.exr"
     return image

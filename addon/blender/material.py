@@ -9,19 +9,27 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import bpy
-import numpy as np
 
-from ..domain.effects import EFFECTS, ShaderInput
+from ..domain.effects import EFFECTS, ShaderInput, grown, residual, skin_map
 from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shader import Shader, assemble, lobe_sockets, table_mixes, table_slices
 from .colour import working_space
-from .images import data_image
+from .images import Pixels, data_image
 from .osl import script_node
 
 MARK = "sanguine"
 """Custom property of every skin material: what it simulates."""
+
+Map = Pixels | bpy.types.Image
+"""Numbers, which become a packed image of the material's own, or an image of numbers that somebody else keeps."""
+
+_OF_THE_FACE = (skin_map.MAP, residual.MAP)
+"""Maps that come with the face and stay when the material goes."""
+
+# Maps that 16-bit floats hold: a rounding of 1 in 2000 does not show, and the file has a seventh of the size.
+_HALF = (*grown.MAPS, *_OF_THE_FACE)
 
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
 # Heights come in mm; the Bump node wants the height of "1" in scene units.
@@ -29,9 +37,9 @@ _MM_PER_M = 1000.0
 
 
 def build_skin_material(
-    name: str, plan: Plan, maps: Mapping[str, np.ndarray], progress: Callable[[int, int], bool] | None = None
+    name: str, plan: Plan, maps: Mapping[str, Map], progress: Callable[[int, int], bool] | None = None
 ) -> bpy.types.Material:
-    """A new material for `plan`. maps: map id -> (H, W, 3 or 4) float32, row 0 lowest, for each of `plan.maps`."""
+    """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`."""
     table = bake(plan.axes, plan.scene.skin, working_space(), progress, plan.settings.lobes)
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # since Blender 5.0 there always is one
@@ -54,7 +62,11 @@ def remove_skin_material(material: bpy.types.Material) -> None:
     groups = [node.node_tree for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup"]
     bpy.data.materials.remove(material)
     for group in groups:
-        images = {node.image for node in group.nodes if node.bl_idname == "ShaderNodeTexImage"}
+        images = {
+            node.image
+            for node in group.nodes
+            if node.bl_idname == "ShaderNodeTexImage" and node.label not in _OF_THE_FACE
+        }
         texts = {node.script for node in group.nodes if node.bl_idname == "ShaderNodeScript"}
         if not group.users:
             bpy.data.node_groups.remove(group)
@@ -62,7 +74,7 @@ def remove_skin_material(material: bpy.types.Material) -> None:
         bpy.data.batch_remove([held for held in images | texts if held and held.users == int(held.use_fake_user)])
 
 
-def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, np.ndarray]) -> bpy.types.NodeTree:
+def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map]) -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
     build = _Builder(name, tree, plan, maps)
     tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
@@ -93,11 +105,14 @@ class _Builder:
 
     points: bpy.types.Node  # the first script, once it is made
 
-    def __init__(self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, np.ndarray]) -> None:
+    def __init__(self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, Map]) -> None:
         self.name, self.tree, self.plan = name, tree, plan
         self.begin = tree.nodes.new("NodeGroupInput")
         self.sources: dict[tuple[str, str], bpy.types.NodeSocket] = {}
-        self.images = {key: data_image(f"{name} {key}", maps[key]) for key in plan.maps}
+        self.images = {key: self._image(key, maps[key]) for key in plan.maps}
+
+    def _image(self, key: str, shown: Map) -> bpy.types.Image:
+        return shown if isinstance(shown, bpy.types.Image) else data_image(f"{self.name} {key}", shown, key in _HALF)
 
     def node(self, kind: str) -> bpy.types.Node:
         return self.tree.nodes.new(kind)
@@ -113,13 +128,13 @@ class _Builder:
 
     def base_values(self, points: bpy.types.Node) -> None:
         """The skin's own values: a slider where the table or a film can follow it, a number where it is fixed."""
-        follows = {axis.id for axis in self.plan.axes}
+        follows = {axis.id for axis in self.plan.axes} - set(skin_map.held(self.plan.scene))
         for socket, key in _BASE.items():
             if key in follows:
                 self.link(self.source(ShaderInput(socket, "float", "parameter", key)), points.inputs[socket])
             else:
                 points.inputs[socket].default_value = self.plan.scene.skin[key]
-        if "film" in points.outputs:
+        if "film" in points.outputs and "oil" not in skin_map.held(self.plan.scene):
             self.link(self.source(ShaderInput("skin_oil", "float", "parameter", "oil")), points.inputs["skin_oil"])
 
     def source(self, item: ShaderInput) -> bpy.types.NodeSocket:
