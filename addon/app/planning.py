@@ -55,7 +55,7 @@ def _quality(shot: Shot, quality: Choice) -> dict[str, Any]:
 
 
 def _entry_ms(plan: Plan) -> float:
-    skins = entry_skins(plan.axes, plan.scene.skin)[:_TIMED_ENTRIES]
+    skins = entry_skins(plan.axes, plan.skin)[:_TIMED_ENTRIES]
     start = time.perf_counter()
     sanguine_core.burley_lobes(skins, "rec709", lobe_count=plan.settings.lobes)
     return (time.perf_counter() - start) * 1000.0 / len(skins)

@@ -40,7 +40,7 @@ def build_skin_material(
     name: str, plan: Plan, maps: Mapping[str, Map], progress: Callable[[int, int], bool] | None = None
 ) -> bpy.types.Material:
     """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`."""
-    table = bake(plan.axes, plan.scene.skin, working_space(), progress, plan.settings.lobes)
+    table = bake(plan.axes, plan.skin, working_space(), progress, plan.settings.lobes)
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # since Blender 5.0 there always is one
         material.use_nodes = True
@@ -133,7 +133,7 @@ class _Builder:
             if key in follows:
                 self.link(self.source(ShaderInput(socket, "float", "parameter", key)), points.inputs[socket])
             else:
-                points.inputs[socket].default_value = self.plan.scene.skin[key]
+                points.inputs[socket].default_value = self.plan.skin[key]
         if "film" in points.outputs and "oil" not in skin_map.held(self.plan.scene):
             self.link(self.source(ShaderInput("skin_oil", "float", "parameter", "oil")), points.inputs["skin_oil"])
 

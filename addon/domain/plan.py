@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, scattering
 from .errors import InputError, nearest
-from .parameters import PARAMETERS
+from .parameters import PARAMETERS, Skin
 from .quality import DEFAULT, Settings, preset
 
 AXIS_CHROMOPHORES = ("hemoglobin", "melanin", "oxygenation", "ink_per_mm")
@@ -59,6 +59,8 @@ class Plan:
     settings: Settings
     decisions: Mapping[str, Activation]
     axes: tuple[Axis, ...]
+    # What is no axis is the same everywhere: the scene's skin, or what a map of one value holds in its place.
+    skin: Skin
     fragments: tuple[Fragment, ...]
     maps: tuple[str, ...]
 
@@ -86,13 +88,14 @@ def make_plan(scene: Scene, settings: Settings | None = None) -> Plan:
 def _decide(scene: Scene, settings: Settings, effects: tuple[Effect, ...]) -> Plan:
     decisions = {effect.id: effect.activate(scene) for effect in effects}
     active = [effect for effect in effects if decisions[effect.id].active]
-    axes = _axes(scene, active, settings.table_step)
+    axes, constants = _axes(scene, active, settings.table_step)
     fragments = [fragment for effect in active for fragment in effect.fragments(scene)]
     return Plan(
         scene=scene,
         settings=settings,
         decisions=decisions,
         axes=axes,
+        skin={**scene.skin, **constants},
         fragments=tuple({fragment.file: fragment for fragment in fragments}.values()),
         maps=tuple(dict.fromkeys(name for effect in active for name in effect.maps(scene))),
     )
@@ -117,8 +120,8 @@ def check_strengths(given: Mapping[str, float], where: str, base: Mapping[str, f
     return strengths
 
 
-def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, ...]:
-    """The chromophores that differ between places or moments, with the range each one takes."""
+def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[tuple[Axis, ...], dict[str, float]]:
+    """The chromophores that differ between places or moments, with the range each one takes, and the others' value."""
     regions = (*scene.regions, ELSEWHERE)
     written = {name for effect in active for name in effect.writes}
     bounds: Bounds = {
@@ -126,14 +129,16 @@ def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[Axis, 
     }
     for effect in active:
         bounds = effect.bounds(scene, bounds)
-    axes = []
+    axes, constants = [], {}
     for name in AXIS_CHROMOPHORES:
         low = min(interval[0] for interval in bounds[name].values())
         high = max(interval[1] for interval in bounds[name].values())
         axis = spaced(name, low, high, table_step)
         if axis:
             axes.append(axis)
-    return tuple(axes)
+        else:
+            constants[name] = low
+    return tuple(axes), constants
 
 
 def _slider_reach(scene: Scene, name: str, written: set[str]) -> tuple[float, float]:
