@@ -6,5 +6,8 @@
 namespace sanguine {
 
 const Feature& freckles_feature();
+const Feature& vessels_feature();
+const Feature& veins_feature();
+const Feature& telangiectasia_feature();
 
 }  // namespace sanguine

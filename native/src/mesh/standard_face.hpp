@@ -1,0 +1,31 @@
+// Places of anatomy on any face.
+#pragma once
+
+#include <optional>
+
+#include <glm/vec3.hpp>
+
+#include "sanguine/skin_surface.hpp"
+
+namespace sanguine {
+
+/// The point of the surface nearest to a place in space. Looks at every triangle: for a handful of landmarks.
+SurfacePoint nearest_point(const SkinSurface& surface, glm::vec3 place_mm);
+
+/// A face in the measures of a standard one: millimetres from the middle between the eyes, the eyes 62 mm apart, x to
+/// the left of the face, y backward, z up. Landmarks of anatomy written so fit any face.
+class StandardFace {
+public:
+    /// Needs both lids; a mesh without them has no frame.
+    static std::optional<StandardFace> of(const SkinSurface& surface);
+
+    glm::vec3 place_mm(glm::vec3 standard) const { return origin_ + scale_ * standard; }
+    glm::vec3 standard(glm::vec3 place_mm) const { return (place_mm - origin_) / scale_; }
+    float scale() const { return scale_; }
+
+private:
+    glm::vec3 origin_{0};
+    float scale_ = 1;
+};
+
+}  // namespace sanguine
