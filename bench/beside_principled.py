@@ -55,7 +55,7 @@ def main() -> None:
     plan = make_plan(scene_of(shot, subject, renderer.regions(subject)), shot.chosen_quality.settings)
     pictures, seconds = {}, {}
     for kind in ("sanguine", "principled"):
-        renderer.prepare(shot, subject, plan)
+        renderer.prepare(shot, subject, plan, {})
         if kind == "principled":
             face = next(obj for obj in bpy.data.objects if obj.name.endswith("_skin"))
             face.data.materials[0] = stock_skin(skin_from(subject.skin, "skin"))

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,6 +18,7 @@ from ..domain.files import atomic, read_json, write_json
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice, Settings
 from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
+from .skin_maps import Tiles, read_face_maps
 
 MANIFEST = "manifest.json"
 CONTACT_SHEET = "contact_sheet.png"
@@ -32,8 +33,8 @@ class Renderer(Protocol):
     def regions(self, subject: Subject) -> tuple[str, ...]:
         """Regions whose masks the subject's face has."""
 
-    def prepare(self, shot: Shot, subject: Subject, plan: Plan) -> None:
-        """Builds the subject's scene in an empty file."""
+    def prepare(self, shot: Shot, subject: Subject, plan: Plan, images: Mapping[str, Tiles]) -> None:
+        """Builds the subject's scene in an empty file. images: the maps that came with the face."""
 
     def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:
         """Renders one pose of the prepared subject: display-referred PNG and linear EXR of the same render."""
@@ -68,20 +69,21 @@ def render_batch(
     done = 0
     for subject in shot.subjects:
         mine = [job for job in wanted if job.subject == subject.id]
-        plan = make_plan(scene_of(shot, subject, renderer.regions(subject)), settings)
+        face = read_face_maps(subject.maps)
+        plan = make_plan(scene_of(shot, subject, renderer.regions(subject), face.ranges), settings)
         missing = []
         for job in mine:
-            prints = _fingerprint(shot, subject, job, settings)
+            prints = _fingerprint(shot, subject, job, settings, face.digest)
             if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in _SUFFIXES):
                 done += 1
             else:
                 missing.append((job, prints))
         if missing:
             progress(f"preparing {subject.id}", done, len(wanted))
-            renderer.prepare(shot, subject, plan)
+            renderer.prepare(shot, subject, plan, face.images)
         for job, prints in missing:
             progress(f"rendering {job.id}", done, len(wanted))
-            files |= _render(shot, subject, plan, job, prints, folder, renderer)
+            files |= _render(shot, subject, plan, job, face.digest, prints, folder, renderer)
             _write_manifest(folder, shot_path, files)
             done += 1
     _contact_sheet(shot, folder, files)
@@ -91,7 +93,7 @@ def render_batch(
 
 
 def _render(
-    shot: Shot, subject: Subject, plan: Plan, job: Job, fingerprint: str, folder: Path, renderer: Renderer
+    shot: Shot, subject: Subject, plan: Plan, job: Job, maps: str, fingerprint: str, folder: Path, renderer: Renderer
 ) -> dict[str, dict[str, Any]]:
     pose = pose_of(shot, job)
     start = time.perf_counter()
@@ -102,7 +104,7 @@ def _render(
         "subject": subject.id,
         "expression": job.expression,
         "frame": job.frame,
-        "parameters": _parameters(shot, subject, job, plan.settings),
+        "parameters": _parameters(shot, subject, job, plan.settings, maps),
         "effects": [e.id for e in plan.active if job.id in plan.decisions[e.id].frames],
         "seconds": round(time.perf_counter() - start, 3),
         "fingerprint": fingerprint,
@@ -110,12 +112,14 @@ def _render(
     return {job.id + suffix: {"file": job.id + suffix, "sha256": sums[suffix], **row} for suffix in _SUFFIXES}
 
 
-def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings) -> dict[str, Any]:
+def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps: str) -> dict[str, Any]:
+    """maps: the hash of the files that hold the maps of the face, "" without any."""
     return {
         "head": subject.rig.head,
         "skin": subject.whole_skin(),
         "effects": subject.strengths(shot.effects),
         "growth": asdict(subject.growth),
+        "maps": maps,
         "pose": pose_of(shot, job).model_dump(exclude={"id", "frame"}),
         "light": shot.light.model_dump(),
         "camera": shot.camera.model_dump(),
@@ -124,10 +128,10 @@ def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings) -> d
     }
 
 
-def _fingerprint(shot: Shot, subject: Subject, job: Job, settings: Settings) -> str:
+def _fingerprint(shot: Shot, subject: Subject, job: Job, settings: Settings, maps: str) -> str:
     """Changes with anything that changes the image. The whole shot's plan is in it by its poses."""
     poses = [pose_of(shot, other).model_dump(exclude={"id", "frame"}) for other in jobs(shot) if other.subject == subject.id]
-    what = [sanguine_core.__version__, _parameters(shot, subject, job, settings), poses]
+    what = [sanguine_core.__version__, _parameters(shot, subject, job, settings, maps), poses]
     return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
 
 

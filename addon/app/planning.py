@@ -12,6 +12,7 @@ from ..domain.lut import entry_skins
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice
 from ..domain.shot import Shot, scene_of
+from .skin_maps import read_face_maps
 
 _TIMED_ENTRIES = 4
 
@@ -24,7 +25,8 @@ def plan_report(shot: Shot, regions: tuple[str, ...], quality: Choice | None = N
     """
     quality = quality or shot.chosen_quality
     plans = {
-        subject.id: make_plan(scene_of(shot, subject, regions), quality.settings) for subject in shot.subjects
+        subject.id: make_plan(scene_of(shot, subject, regions, read_face_maps(subject.maps).ranges), quality.settings)
+        for subject in shot.subjects
     }
     entry_ms = _entry_ms(next(iter(plans.values())))
     reports = {name: _report(plan, entry_ms) for name, plan in plans.items()}

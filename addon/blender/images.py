@@ -10,7 +10,11 @@ import bpy
 import numpy as np
 import sanguine_core
 
+from ..domain.effects.effect import Interval
 from ..domain.udim import FIRST_TILE
+
+RANGE = "sanguine_range"
+"""Custom property of an image: chromophore that it holds -> lowest and highest value over its texels."""
 
 Pixels = np.ndarray | Mapping[int, np.ndarray]
 """(H, W, 1, 3 or 4) float32, row 0 lowest, or one such array per UDIM tile."""
@@ -33,6 +37,30 @@ def data_image(name: str, pixels: Pixels, half: bool = False) -> bpy.types.Image
     image.update()
     image.pack()
     return image
+
+
+def store_range(image: bpy.types.Image, ranges: Mapping[str, Interval]) -> None:
+    """Keeps with the image what it holds, and between which values: the table has to reach that far."""
+    image[RANGE] = {name: list(interval) for name, interval in ranges.items()}
+
+
+def measure_range(image: bpy.types.Image, channels: tuple[str, ...]) -> None:
+    """Stores the ranges of an image from its texels, its channels named in order: of those it is known to hold, or of
+    all. Blender shows no texels of tiles other than the first, so a tiled image keeps what it has."""
+    if image.library or image.source == "TILED" or not image.size[0]:
+        return
+    known = stored_range(image) or channels
+    texels = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(texels)
+    values = texels.reshape(-1, image.channels)
+    held = zip(channels, values.min(axis=0), values.max(axis=0), strict=False)
+    store_range(image, {name: (float(low), float(high)) for name, low, high in held if name in known})
+
+
+def stored_range(image: bpy.types.Image) -> dict[str, Interval] | None:
+    """What `store_range` kept, or None."""
+    held = image.get(RANGE)
+    return {name: (values[0], values[1]) for name, values in held.items()} if held is not None else None
 
 
 def _from_files(name: str, tiles: Mapping[int, np.ndarray], half: bool) -> bpy.types.Image:

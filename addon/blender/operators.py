@@ -8,7 +8,7 @@ from ..domain.effects import Frame, Scene
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
-from .properties import quality_of, skin_of, strengths_of
+from .properties import map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions
 
@@ -36,6 +36,7 @@ def live_plan(face: bpy.types.Object) -> Plan:
             strengths=strengths_of(face),
             regions=face_regions(face),
             live=True,
+            maps=map_ranges_of(face),
         ),
         quality_of(face),
     )
@@ -67,6 +68,7 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             rig = controls_of(face) or _new_rig(context, face)
             add_controls(rig)
             driven = drive_shape_keys(rig, [child for child in (face, *rig.children) if child.type == "MESH"])
+            measure_maps(face)
             plan = live_plan(face)
             apply_skin(face, rig, plan, skin_slot(face))
         except (ValueError, RuntimeError) as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..domain.blood import BLOOD_CONTROL
-from ..domain.effects import EFFECTS
+from ..domain.effects import EFFECTS, residual, skin_map
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
@@ -59,6 +59,8 @@ class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
         for effect in EFFECTS:
             if effect.default_strength is not None:
                 layout.prop(settings, strength_property(effect.id), slider=True)
+        for name in (skin_map.MAP, residual.MAP):
+            layout.prop(settings, name)
 
 
 class SANGUINE_PT_plan(_FacePanel, bpy.types.Panel):

@@ -1,12 +1,14 @@
-"""`Object.sanguine`: the skin of a face, one Blender property per row of the schema and per effect strength, and its quality."""
+"""`Object.sanguine`: the skin of a face, one Blender property per row of the schema, effect strength and map, and its quality."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..domain.effects import EFFECTS
+from ..domain.effects import EFFECTS, residual, skin_map
+from ..domain.effects.effect import Interval
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import DEFAULT, PRESETS, Settings, preset
+from .images import measure_range, stored_range
 
 
 def _skin_properties() -> dict[str, object]:
@@ -31,6 +33,11 @@ def _skin_properties() -> dict[str, object]:
                 name=effect.label, description=effect.help, default=effect.default_strength, min=0.0, max=1.0,
                 override={"LIBRARY_OVERRIDABLE"},
             )
+    channels = "red {}, green {}, blue {}, alpha {}".format(*skin_map.CHANNELS)
+    for effect, more in ((skin_map.EFFECT, f" {channels.capitalize()}"), (residual.EFFECT, "")):
+        made[effect.id] = bpy.props.PointerProperty(
+            type=bpy.types.Image, name=effect.label, description=effect.help + more, override={"LIBRARY_OVERRIDABLE"}
+        )
     made["quality"] = bpy.props.EnumProperty(
         name="Quality",
         description="How finely the skin is simulated: samples change at once, the rest when the skin is applied",
@@ -78,6 +85,27 @@ def strengths_of(obj: bpy.types.Object) -> dict[str, float]:
         for effect in EFFECTS
         if effect.default_strength is not None
     }
+
+
+def images_of(obj: bpy.types.Object) -> dict[str, bpy.types.Image]:
+    """Map id -> image, of the maps that the object's properties point to; none where the add-on is not registered."""
+    settings = getattr(obj, "sanguine", None)
+    found = {name: getattr(settings, name, None) for name in (skin_map.MAP, residual.MAP)}
+    return {name: image for name, image in found.items() if image is not None}
+
+
+def map_ranges_of(obj: bpy.types.Object) -> dict[str, dict[str, Interval]]:
+    """What `Scene.maps` wants to know of them. A skin map of unknown range is taken to reach as far as the sliders do."""
+    whole = {name: (PARAMETERS[name].soft_min, PARAMETERS[name].soft_max) for name in skin_map.CHANNELS}
+    return {
+        name: (stored_range(image) or whole) if name == skin_map.MAP else {} for name, image in images_of(obj).items()
+    }
+
+
+def measure_maps(obj: bpy.types.Object) -> None:
+    """Takes the ranges of the object's skin map anew: somebody may have painted on it."""
+    if (image := images_of(obj).get(skin_map.MAP)) is not None:
+        measure_range(image, skin_map.CHANNELS)
 
 
 def quality_of(obj: bpy.types.Object) -> Settings:

@@ -7,12 +7,13 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
+from ..app.skin_maps import Tiles
 from ..domain.blood import BLOOD_CONTROL
 from ..domain.errors import InputError, nearest
 from ..domain.effects.regions import FACE_REGIONS
@@ -32,7 +33,7 @@ class BlenderRenderer:
     def regions(self, subject: Subject) -> tuple[str, ...]:
         return FACE_REGIONS
 
-    def prepare(self, shot: Shot, subject: Subject, plan: Plan) -> None:
+    def prepare(self, shot: Shot, subject: Subject, plan: Plan, images: Mapping[str, Tiles]) -> None:
         with quiet():
             # Not the factory's preferences: inside Blender they would switch off the add-on that is running.
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -47,7 +48,7 @@ class BlenderRenderer:
                 lights=tuple(replace(light, power=light.power * shot.light.strength) for light in LIGHTS),
             )
             set_image(scene, shot.image, plan.settings.samples)
-            apply_skin(face.skin, face.rig, plan)
+            apply_skin(face.skin, face.rig, plan, given=images)
         self._rig = face.rig
 
     def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:

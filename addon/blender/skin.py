@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import bpy
-import numpy as np
 
 from ..app.maps import Surface, bake_maps
 from ..domain.blood import BLOOD_CHANNELS
+from ..domain.errors import InputError
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
-from ..domain.udim import FIRST_TILE
+from ..domain.udim import FIRST_TILE, check_tiles
 from .controls import drive_blood
-from .material import MARK, build_skin_material, remove_skin_material
+from .material import MARK, Map, build_skin_material, remove_skin_material
+from .properties import images_of
 from .surface import pixel_mm, read_surface, store_rest
 
 
@@ -23,9 +24,13 @@ def apply_skin(
     plan: Plan,
     slot: int = 0,
     progress: Callable[[int, int], bool] | None = None,
+    given: Mapping[str, Map] | None = None,
 ) -> bpy.types.Material:
-    """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`."""
-    maps = _bake(face, plan, progress) if plan.maps else {}
+    """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`.
+
+    given: the maps that came with the face, by id; left out, those that its properties point to.
+    """
+    maps = _maps(face, plan, images_of(face) if given is None else given, progress) if plan.maps else {}
     before = face.material_slots[slot].material if face.material_slots else None
     if before is not None and MARK in before and before.users == 1:
         remove_skin_material(before)
@@ -42,13 +47,28 @@ def apply_skin(
     return material
 
 
-def _bake(
-    face: bpy.types.Object, plan: Plan, progress: Callable[[int, int], bool] | None
-) -> dict[str, np.ndarray | dict[int, np.ndarray]]:
+def _maps(
+    face: bpy.types.Object, plan: Plan, given: Mapping[str, Map], progress: Callable[[int, int], bool] | None
+) -> dict[str, Map]:
     """Map id -> image, or images by UDIM tile where the layout has more than the first."""
     surface = read_surface(face)
     tiles = bake_maps(plan, surface, needed_sizes(face, surface, plan), progress=progress)
-    return {name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()}
+    maps: dict[str, Map] = {
+        name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()
+    }
+    for name in plan.maps:
+        if name in given:
+            if isinstance(given[name], bpy.types.Image) and not given[name].size[0]:
+                raise InputError(f"{face.name}: {name}: the image '{given[name].name}' has no pixels: its file is missing")
+            check_tiles(_tiles(given[name]), surface.tiles, f"{face.name}: {name}")
+            maps[name] = given[name]
+    return maps
+
+
+def _tiles(shown: Map) -> list[int]:
+    if isinstance(shown, bpy.types.Image):
+        return [tile.number for tile in shown.tiles] if shown.source == "TILED" else [FIRST_TILE]
+    return list(shown) if isinstance(shown, Mapping) else [FIRST_TILE]
 
 
 def needed_sizes(face: bpy.types.Object, surface: Surface, plan: Plan) -> MapSizes:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Literal
 
 import pydantic
 
 from . import people
 from .effects import Frame, Growth, Scene
+from .effects.effect import Interval
 from .errors import InputError, nearest
 from .facs import ACTION_UNITS, EMOTIONS
 from .files import read_toml, validate
@@ -19,6 +21,7 @@ from .parameters import skin_from
 from .plan import check_strengths
 from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
+from .udim import find_tiles
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _MAX_IMAGES = 100_000  # per shot; a study of thousands fits, a typing error in a frame range does not
@@ -67,6 +70,16 @@ class Individual(_Table):
         return people.person(self.tone, self.sex, self.age, self.seed, self.sun)
 
 
+class Maps(_Table):
+    """Maps that come with a face, as EXR files (`<UDIM>` for sets of tiles); paths are relative to the shot's.
+
+    skin: channels hemoglobin, melanin, oil, oxygenation or some of them. residual: channels R, G, B.
+    """
+
+    skin: str | None = None
+    residual: str | None = None
+
+
 class Subject(_Table):
     """One person: a rig and a skin. A shot has several, or one by its top-level `rig`, `person` and `skin`."""
 
@@ -74,6 +87,7 @@ class Subject(_Table):
     rig: Rig
     person: Individual | None = None
     skin: dict[str, float] = {}
+    maps: Maps = Maps()
 
     def whole_skin(self, where: str = "skin") -> dict[str, float]:
         """Every parameter: what `skin` names, else the person's, else the schema's default. Raises InputError."""
@@ -162,6 +176,7 @@ class Shot(_Table):
     rig: Rig | None = None
     person: Individual | None = None
     skin: dict[str, float] = {}
+    maps: Maps = Maps()
     effects: dict[str, float] = {}
     subject: list[Subject] = []
     expression: list[Expression] = []
@@ -190,7 +205,7 @@ class Shot(_Table):
         if self.subject:
             return self.subject
         assert self.rig is not None  # read_shot saw to it
-        return [Subject(id="subject", rig=self.rig, person=self.person, skin=self.skin)]
+        return [Subject(id="subject", rig=self.rig, person=self.person, skin=self.skin, maps=self.maps)]
 
 
 class Job(_Table):
@@ -210,6 +225,8 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
                          + ("both" if shot.subject else "neither"))
     if shot.subject and shot.person:
         raise InputError(f"{path}: person: give it to the [[subject]] tables, each its own")
+    if shot.subject and shot.maps != Maps():
+        raise InputError(f"{path}: maps: give them to the [[subject]] tables, each its own")
     if bool(shot.expression) == (shot.timeline is not None):
         raise InputError(f"{path}: expression: give [[expression]] tables or one [timeline], not "
                          + ("both" if shot.expression else "neither"))
@@ -231,7 +248,26 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
         if job.id in taken:
             raise InputError(f"{path}: expression: two pictures would be named '{job.id}': change an id")
         taken.add(job.id)
-    return shot
+    found = {
+        "maps": _found(shot.maps, path, "maps"),
+        "subject": [
+            item.model_copy(update={"maps": _found(item.maps, path, f"subject {item.id}: maps")}) for item in shot.subject
+        ],
+    }
+    return shot.model_copy(update=found)
+
+
+def _found(maps: Maps, shot_path: str | os.PathLike[str], where: str) -> Maps:
+    """`maps` with whole paths. Raises InputError for files that are not there."""
+    found = {}
+    for key, name in maps.model_dump(exclude_none=True).items():
+        file = Path(shot_path).resolve().parent / name
+        try:
+            find_tiles(file)
+        except InputError as error:
+            raise InputError(f"{shot_path}: {where}.{key}: {error}") from None
+        found[key] = str(file)
+    return Maps(**found)
 
 
 def _count(shot: Shot) -> int:
@@ -283,8 +319,10 @@ def pose_of(shot: Shot, job: Job) -> Pose:
     )
 
 
-def scene_of(shot: Shot, subject: Subject, regions: tuple[str, ...]) -> Scene:
-    """What the planner may know of one subject of a shot."""
+def scene_of(
+    shot: Shot, subject: Subject, regions: tuple[str, ...], maps: Mapping[str, Mapping[str, Interval]] | None = None
+) -> Scene:
+    """What the planner may know of one subject of a shot. maps: ranges of those that came with the face (`Scene.maps`)."""
     frames = []
     for job in jobs(shot):
         if job.subject != subject.id:
@@ -298,4 +336,5 @@ def scene_of(shot: Shot, subject: Subject, regions: tuple[str, ...]) -> Scene:
         strengths=subject.strengths(shot.effects),
         regions=regions,
         growth=subject.growth,
+        maps=maps or {},
     )

@@ -24,7 +24,7 @@ class PaintRenderer:
     def regions(self, subject):
         return FACE_REGIONS
 
-    def prepare(self, shot, subject, plan):
+    def prepare(self, shot, subject, plan, images):
         self.prepared.append((subject.id, plan))
 
     def render(self, pose, frame, png, exr):
