@@ -192,6 +192,27 @@ TEST_F(ExrMaps, DamageIsRefusedOrHarmless) {
     }
 }
 
+TEST_F(ExrMaps, TextsOfAFileAreMadeUtf8) {
+    // Who reads them in Python would fail on other bytes; the pixels of such a channel arrive all the same.
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"caf\xc3\xa9 \xf0\x9f\x99\x82", "caf\xc3\xa9 \xf0\x9f\x99\x82"},
+        {"a\xff" "b", "a?b"},
+        {"cut \xe2\x82", "cut ??"},
+        {"long \xc0\xaf", "long ??"},
+        {"half \xed\xa0\x80", "half ???"},
+        {"far \xf4\x90\x80\x80", "far ????"},
+    };
+    const std::vector<float> pixel = {0.5F};
+    for (const auto& [in_file, expected] : cases) {
+        write_exr_map(folder_ / "a.exr", {1, 1, 1, pixel}, std::vector{in_file}, {{"note", in_file}}, true);
+        const ExrMap map = read_exr_map(folder_ / "a.exr");
+        EXPECT_EQ(map.channels.at(0), expected);
+        EXPECT_EQ(map.attributes.at("note"), expected);
+        EXPECT_EQ(map.image.pixels[0], 0.5F);
+        EXPECT_EQ(std::string(ImageError("a.exr", in_file).what()), "a.exr: " + expected);
+    }
+}
+
 TEST_F(ExrMaps, OtherFilesAreRefused) {
     expect_one_line_naming(folder_ / "absent.exr");
     expect_one_line_naming(folder_);

@@ -19,6 +19,7 @@
 #include <half.h>
 
 #include "atomic_file.hpp"
+#include "open_image.hpp"
 
 namespace sanguine {
 namespace {
@@ -115,10 +116,10 @@ Imf::Header make_header(int width, int height, std::span<const std::string> chan
 ExrMapInfo info_of(const Imf::Header& header) {
     ExrMapInfo info;
     for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
-        info.channels.emplace_back(channel.name());
+        info.channels.push_back(valid_utf8(channel.name()));
     for (auto attribute = header.begin(); attribute != header.end(); ++attribute)
         if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute.attribute()))
-            info.attributes.emplace(attribute.name(), text->value());
+            info.attributes.emplace(valid_utf8(attribute.name()), valid_utf8(text->value()));
     const Imath::Box2i window = header.dataWindow();
     info.width = window.max.x - window.min.x + 1;
     info.height = window.max.y - window.min.y + 1;
@@ -300,9 +301,10 @@ ExrMap read_exr_map(const fs::path& path) {
             // The slices point at where column 0 and line 0 would be: moved back by the data window's origin.
             float* origin = line.data() - std::ptrdiff_t(map.channels.size()) * window.min.x;
             Imf::FrameBuffer buffer;
-            for (std::size_t c = 0; c < map.channels.size(); ++c)
-                buffer.insert(map.channels[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(origin + c),
-                                                          sizeof(float) * map.channels.size(), 0));
+            std::size_t c = 0;
+            for (auto channel = file.header().channels().begin(); channel != file.header().channels().end(); ++channel)
+                buffer.insert(channel.name(), Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(origin + c++),
+                                                         sizeof(float) * map.channels.size(), 0));
             file.setFrameBuffer(buffer);
             file.readPixels(window.min.y + y);
             std::ranges::copy(line, &image.pixels[row * std::size_t(image.height - 1 - y)]);

@@ -39,8 +39,7 @@ void read_pixels(OIIO::ImageInput& input, const fs::path& path, OIIO::TypeDesc t
                  OIIO::stride_t row_stride) {
     const OIIO::ImageSpec& spec = input.spec();
     const auto pixel = OIIO::stride_t(type.size()) * spec.nchannels;
-    if (!input.read_image(0, 0, 0, spec.nchannels, type, top_row, pixel, row_stride))
-        throw ImageError(path, "cannot be read: " + input.geterror());
+    check_read(input.read_image(0, 0, 0, spec.nchannels, type, top_row, pixel, row_stride), input, path);
 }
 
 void write_pixels(const fs::path& path, OIIO::ImageSpec spec, OIIO::TypeDesc memory_type, const void* top_row,
@@ -99,7 +98,7 @@ Picture read_picture(const fs::path& path) {
 }  // namespace
 
 ImageError::ImageError(const fs::path& path, const std::string& what)
-    : std::runtime_error(path.string() + ": " + one_line(what)) {}
+    : std::runtime_error(valid_utf8(path.string() + ": " + one_line(what))) {}
 
 Image read_image(const fs::path& path) {
     const auto input = open_checked(path);

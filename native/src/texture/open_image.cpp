@@ -29,4 +29,33 @@ void check_fits_memory(const std::filesystem::path& path, const OIIO::ImageSpec&
                                    " are allowed in memory at once");
 }
 
+void check_read(bool done, OIIO::ImageInput& input, const std::filesystem::path& path) {
+    const std::string said = input.geterror();
+    // A JPEG that is cut short is filled up with grey, and nothing but this remark tells of it.
+    if (!done || said.find("Premature end of JPEG") != std::string::npos)
+        throw ImageError(path, "cannot be read: " + said);
+}
+
+std::string valid_utf8(std::string text) {
+    const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+    for (std::size_t i = 0; i < text.size();) {
+        const unsigned first = byte(i);
+        const std::size_t length = first < 0x80                     ? 1
+                                   : first < 0xc2 || first >= 0xf5 ? 0
+                                   : first < 0xe0                  ? 2
+                                   : first < 0xf0                  ? 3
+                                                                   : 4;
+        bool valid = length > 0;
+        for (std::size_t k = 1; k < length; ++k) valid = valid && (byte(i + k) & 0xc0U) == 0x80;
+        // Longer than needed, surrogates, and beyond the last code point (Unicode, table 3-7).
+        if (first == 0xe0) valid = valid && byte(i + 1) >= 0xa0;
+        if (first == 0xed) valid = valid && byte(i + 1) < 0xa0;
+        if (first == 0xf0) valid = valid && byte(i + 1) >= 0x90;
+        if (first == 0xf4) valid = valid && byte(i + 1) < 0x90;
+        if (!valid) text[i] = '?';
+        i += valid ? length : 1;
+    }
+    return text;
+}
+
 }  // namespace sanguine

@@ -1,8 +1,9 @@
-// How every reader of pictures opens a file: held against the limits before memory is taken.
+// How every reader of pictures opens a file: held against the limits before memory is taken, its texts made harmless.
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include <OpenImageIO/imageio.h>
 
@@ -13,5 +14,11 @@ std::unique_ptr<OIIO::ImageInput> open_checked(const std::filesystem::path& path
 
 /// Throws ImageError if all of it is more than a picture in memory may have.
 void check_fits_memory(const std::filesystem::path& path, const OIIO::ImageSpec& spec);
+
+/// After a read: throws ImageError with what the format's reader says if it failed, or if it made rows up.
+void check_read(bool done, OIIO::ImageInput& input, const std::filesystem::path& path);
+
+/// A text out of a file: bytes that are no UTF-8 become '?'.
+std::string valid_utf8(std::string text);
 
 }  // namespace sanguine

@@ -22,7 +22,7 @@ struct FileRows {
 class RowReader::Impl {
 public:
     explicit Impl(const fs::path& path) : path_(path), input_(open_checked(path)), spec_(input_->spec()) {
-        channels.assign(spec_.channelnames.begin(), spec_.channelnames.end());
+        for (const std::string& name : spec_.channelnames) channels.push_back(valid_utf8(name));
         channels.resize(std::size_t(spec_.nchannels));  // whatever the file says, one per channel
         pixel_type = spec_.format.c_str();
         const std::string format = input_->format_name();
@@ -93,7 +93,7 @@ private:
                                      spec_.nchannels, OIIO::TypeFloat, into)
                 : input_->read_scanlines(0, 0, y + rows.begin, y + rows.end, spec_.z, 0, spec_.nchannels,
                                          OIIO::TypeFloat, into);
-        if (!done) throw ImageError(path_, "cannot be read: " + input_->geterror());
+        check_read(done, *input_, path_);
     }
 
     fs::path path_;

@@ -1,6 +1,7 @@
 #include "sanguine/texture_file.hpp"
 
 #include <sstream>
+#include <string_view>
 
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
@@ -14,18 +15,15 @@ namespace sanguine {
 void make_tx(const std::filesystem::path& source, const std::filesystem::path& destination) {
     if (OIIO::Strutil::lower(destination.extension().string()) != ".tx")
         throw ImageError(destination, "cannot be written: the extension .tx is allowed");
-    OIIO::ImageSpec read_as;
-    read_as.attribute("oiio:UnassociatedAlpha", 1);
-    OIIO::ImageBuf pixels;
-    OIIO::ImageSpec write_as;
-    {
-        const auto input = open_checked(source);
-        check_fits_memory(source, input->spec());
-        if (std::string_view(input->format_name()) == "openexr") write_as.attribute("maketx:fileformatname", "openexr");
-        pixels.reset(source.string(), 0, 0, nullptr, &read_as);
-    }
-    if (!pixels.read(0, 0, true)) throw ImageError(source, "cannot be read: " + pixels.geterror());
+    const auto input = open_checked(source);
+    OIIO::ImageSpec layout = input->spec();
+    check_fits_memory(source, layout);
+    layout.channelformats.clear();  // in memory all channels have one type
+    OIIO::ImageBuf pixels(layout);
+    check_read(input->read_image(0, 0, 0, layout.nchannels, layout.format, pixels.localpixels()), *input, source);
 
+    OIIO::ImageSpec write_as;
+    if (std::string_view(input->format_name()) == "openexr") write_as.attribute("maketx:fileformatname", "openexr");
     write_as.attribute("oiio:UnassociatedAlpha", 1);
     write_as.attribute("wrapmodes", "clamp,clamp");  // black beyond a border would be skin without blood
     write_as.attribute("maketx:set_full_to_pixels", 1);
@@ -45,8 +43,7 @@ TextureInfo texture_info(const std::filesystem::path& path) {
     const OIIO::ImageSpec last = input->spec(0, info.levels - 1);
     if (last.width != 1 || last.height != 1 || last.nchannels != input->spec().nchannels) return info;
     info.mean.resize(std::size_t(last.nchannels));
-    if (!input->read_image(0, info.levels - 1, 0, last.nchannels, OIIO::TypeFloat, info.mean.data()))
-        throw ImageError(path, "cannot be read: " + input->geterror());
+    check_read(input->read_image(0, info.levels - 1, 0, last.nchannels, OIIO::TypeFloat, info.mean.data()), *input, path);
     return info;
 }
 
