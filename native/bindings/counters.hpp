@@ -18,10 +18,11 @@ struct Counters {
     Counter texels_rasterized{"texels_rasterized"};  ///< pixels of drawn maps, each channel once
     Counter texels_painted{"texels_painted"};        ///< places of maps, each feature once
     Counter spectra_fitted{"spectra_fitted"};        ///< measured spectra
+    Counter texels_inverted{"texels_inverted"};      ///< texels of pictures
 
-    std::array<Counter*, 7> all() {
+    std::array<Counter*, 8> all() {
         return {&spectral_solves,   &profile_solves, &lobe_fits,     &stack_solves,
-                &texels_rasterized, &texels_painted, &spectra_fitted};
+                &texels_rasterized, &texels_painted, &spectra_fitted, &texels_inverted};
     }
 };
 

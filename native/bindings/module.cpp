@@ -7,6 +7,7 @@ namespace nb = nanobind;
 
 void bind_bench(nb::module_& m);
 void bind_fit(nb::module_& m);
+void bind_inversion(nb::module_& m);
 void bind_mesh(nb::module_& m);
 void bind_optics(nb::module_& m);
 void bind_solve(nb::module_& m);
@@ -16,6 +17,7 @@ NB_MODULE(_core, m) {
     m.doc() = "Sanguine's native core. Units stand in the names: mm, per_mm, nm; fractions are 0 to 1.";
     m.attr("__version__") = SANGUINE_VERSION;
     bind_fit(m);
+    bind_inversion(m);
     bind_optics(m);
     bind_solve(m);
     bind_bench(m);

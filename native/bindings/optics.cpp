@@ -1,11 +1,9 @@
 // Skin optics: coefficients, reflectance, profiles, colour, lobes.
 #include <cmath>
-#include <variant>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/variant.h>
 
 #include "arrays.hpp"
 #include "counters.hpp"
@@ -14,6 +12,7 @@
 #include "sanguine/colour.hpp"
 #include "sanguine/skin.hpp"
 #include "sanguine/surface.hpp"
+#include "spaces.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -22,8 +21,6 @@ using namespace sanguine;
 namespace {
 
 using ColoursIn = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using MatrixIn = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
-using SpaceIn = std::variant<std::string, MatrixIn>;
 
 std::span<const double> view(const VectorIn& values) {
     return {values.data(), values.size()};
@@ -35,22 +32,6 @@ std::vector<SkinParameters> skins_from(const TableIn& rows) {
     for (std::size_t i = 0; i < rows.shape(0); ++i)
         skins.push_back(skin_from_row({rows.data() + i * rows.shape(1), rows.shape(1)}, i));
     return skins;
-}
-
-/// Colours are sums: one NaN or infinity would be in all of them.
-template <class Array> void require_finite(const char* name, const Array& values) {
-    for (std::size_t i = 0; i < values.size(); ++i)
-        if (!std::isfinite(values.data()[i]))
-            throw std::invalid_argument(std::string(name) + ": " + std::to_string(values.data()[i]) + " at " + std::to_string(i)
-                                        + " is not a finite number");
-}
-
-Matrix3 rgb_matrix(const SpaceIn& space) {
-    if (const auto* name = std::get_if<std::string>(&space))
-        return rgb_from_xyz(*name);
-    require_finite("working_space", std::get<MatrixIn>(space));
-    const double* m = std::get<MatrixIn>(space).data();
-    return {{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}}};
 }
 
 nb::list parameters() {
