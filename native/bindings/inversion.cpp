@@ -184,6 +184,7 @@ void bind_inversion(nb::module_& m) {
         .def_ro("skin_share", &PictureModel::skin_share)
         .def_ro("shading_found", &PictureModel::shading_found, "Standard deviation of ln shading, before what is kept of it.")
         .def_ro("shading_pigment", &PictureModel::shading_pigment, "The same as oxygenation alone could feign it.")
+        .def_ro("exposure", &PictureModel::exposure, "ln of a factor on the whole picture that is in the shading.")
         .def_ro("shading_kept", &PictureModel::shading_kept, "Share of the found shading that is kept, 0 to 1.");
 
     m.def("picture_models", &py_models, "inverse"_a, "overviews"_a, "shading"_a = "auto", "noise"_a = nb::none(),

@@ -35,16 +35,16 @@ struct InversionAxis {
 };
 const std::array<InversionAxis, 3>& inversion_axes();
 
-/// How far the colour of an estimate may lie from the picture without a pull of the priors: standard deviation in
-/// L*a*b*, of what the model of skin does not follow. A guess between the 0.13 that 10 nm instead of 5 nm make and the
-/// 0.76 that measured faces leave (docs/measured_skin.md).
-inline constexpr double inversion_model_sd = 0.3;
+/// How far the colour of an estimate may lie from the picture without a pull of the priors: standard deviation of each of
+/// L*, a*, b*, of what the model of skin does not follow. Measured faces leave Delta E 0.76 (docs/measured_skin.md), about
+/// 1 in L*a*b*.
+inline constexpr double inversion_model_sd = 0.6;
 
 /// Rows and columns around a texel that its estimate looks at.
 inline constexpr int inversion_halo = 3;
 
 /// Nodes per axis of the table over L*a*b*; docs/inversion.md has error and time by size.
-inline constexpr int default_inversion_nodes = 49;
+inline constexpr int default_inversion_nodes = 33;
 
 /// The answers for one skin, of which all but melanin, hemoglobin and oxygenation is given. Immutable.
 ///
@@ -126,8 +126,10 @@ struct PictureModel {
     double skin_share;                          ///< of the overview
     double shading_found, shading_pigment;      ///< standard deviation of ln shading: found, and what pigment may feign
     double shading_kept;                        ///< share of what was found that is kept
+    double exposure;                            ///< ln of a factor on the whole picture that is in the shading
     int columns, rows, cell;                    ///< of the overview
     std::vector<float> shading;                 ///< [row][column] factor on the light; empty: 1 everywhere
+    std::vector<float> near;                    ///< [row][column] ln melanin of the skin around
     std::vector<float> fill;                    ///< [row][column][3] SkinPoint for what is not skin
 };
 

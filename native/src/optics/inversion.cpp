@@ -455,34 +455,36 @@ SANGUINE_INLINE void inverse_with_variance(const InverseTable& t, const std::arr
 
 /// The soft ends of what counts as this picture's skin.
 struct MaskRule {
-    float centre[2], above[2], below[2], error_free;
+    float centre[2], above[2], below[2], above_near, hair, error_free;
 };
 
 MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double noise_sd) {
-    // Freckles have up to three times the melanin of the skin around (guess: their contrast of 5-10 L* at -11 L* per
-    // factor e), lips 4.5 times its blood (rigs/anatomy.toml): both have to pass. Brown hair has ten times and more.
+    // Melanin is judged by what is near, because light and sun change slowly over a face and hair does not. Freckles have up to two and a half times the melanin of the skin around (guess: their contrast of 5-10 L* at -11 L*
+    // per factor e), lips 4.5 times its blood (rigs/anatomy.toml): both have to pass. Hair has much more melanin and no
+    // blood: together these tell it even where either alone could be skin.
     MaskRule r;
     r.centre[0] = centre[0], r.centre[1] = centre[1];
-    r.above[0] = std::max(1.2f, 3 * spread[0]);
-    r.below[0] = std::max(1.2f, 3 * spread[0]);
-    r.above[1] = std::max(1.9f, 3.5f * spread[1]);
-    r.below[1] = std::max(1.6f, 3.5f * spread[1]);
+    r.above[0] = std::clamp(3 * spread[0], 1.2f, 1.6f);
+    r.below[0] = std::clamp(3 * spread[0], 1.0f, 1.6f);
+    r.above[1] = std::clamp(3.5f * spread[1], 1.9f, 2.5f);
+    r.below[1] = std::clamp(3.5f * spread[1], 1.4f, 1.8f);
+    r.above_near = 0.95f;
+    r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.0f, 1.2f);
     r.error_free = float(3 + 2 * noise_sd);
     return r;
 }
 
 /// Squared distance from skin, 0 for all that counts as skin.
-SANGUINE_INLINE float distance_from_skin(const MaskRule& r, float m, float h, float lab_error_squared) {
-    const auto beyond = [](float d, float above, float below) {
-        const float up = d - above, down = -d - below;
-        const float over = up > down ? up : down;
-        return over > 0 ? over / 0.35f : 0.0f;
-    };
-    const float pm = beyond(m - r.centre[0], r.above[0], r.below[0]);
-    const float ph = beyond(h - r.centre[1], r.above[1], r.below[1]);
+SANGUINE_INLINE float distance_from_skin(const MaskRule& r, float m, float h, float m_near, float lab_error_squared) {
+    const float dm = m - r.centre[0], dh = h - r.centre[1], dn = m - m_near;
+    const auto beyond = [](float d, float end) { return d > end ? (d - end) * (1 / 0.35f) : 0.0f; };
+    const float pm = beyond(dm, r.above[0]) + beyond(-dm, r.below[0]);
+    const float ph = beyond(dh, r.above[1]) + beyond(-dh, r.below[1]);
+    const float near = beyond(dn, r.above_near);
+    const float hair = dn > 0.4f ? beyond(dn - dh, r.hair) : 0.0f;
     const float e = std::sqrt(lab_error_squared) - r.error_free;
     const float pe = e > 0 ? e * (1.0f / 3) : 0.0f;
-    return pm * pm + ph * ph + pe * pe;
+    return pm * pm + ph * ph + near * near + hair * hair + pe * pe;
 }
 
 // ---- Colour difference
@@ -766,6 +768,7 @@ struct Cells {
     std::vector<float> there;               ///< share of the cell
     std::vector<SkinPoint> point;
     std::vector<float> error, mask;         ///< squared distance in Lab; probability of skin
+    std::vector<float> near;                ///< ln melanin of the skin around
     std::vector<float> shade, sure;         ///< ln of the light, and how sure
 };
 
@@ -884,6 +887,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         cells[t].rgb.assign(count, {});
         cells[t].there.resize(count);
         cells[t].shade.assign(count, 0);
+        cells[t].near.assign(count, usual[0]);
         for (std::size_t i = 0; i < count; ++i) {
             const int x = int(i % o.columns_) * o.cell_, y = int(i / o.columns_) * o.cell_;
             const double area = double(std::min(o.cell_, o.width_ - x)) * std::min(o.cell_, o.height_ - y);
@@ -895,36 +899,68 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         }
     }
 
-    // Estimates of all cells, what is skin among them, and how the skin is distributed; each helps the others.
+    // Estimates of all cells, what is skin among them, and how the skin is distributed; each helps the others. With
+    // `lit` the light on each cell is free and oxygenation stays at its prior: what lies outside the skin gamut by its
+    // brightness alone is skin all the same.
     SkinPoint centre = usual, spread{0.5f, 0.5f, 0.1f};
     double skin_share = 0;
-    const auto look = [&](double noise_sd) {
-        for (Cells& c : cells) {
-            c.point.resize(c.rgb.size());
-            c.error.resize(c.rgb.size());
+    bool first_look = true;
+    // A share of the longer side: broader than a brow or a lip is high. A guess.
+    const auto low_pass_sigma = [](const PictureOverview& o) { return std::max(1.0, 0.07 * std::max(o.columns_, o.rows_)); };
+    const Search lit_search(inverse.forward_.data(), true);
+    const auto look = [&](double noise_sd, bool lit) {
+        for (std::size_t t = 0; t < cells.size(); ++t) {
+            Cells& c = cells[t];
+            c.point.assign(c.rgb.size(), usual);
+            c.error.assign(c.rgb.size(), 0);
             c.mask.assign(c.rgb.size(), 0);
-            for (std::size_t i = 0; i < c.rgb.size(); ++i) {
-                std::array<float, 3> rgb = c.rgb[i];
-                for (float& v : rgb)
-                    v /= std::exp(c.shade[i]);
-                const std::array<float, 3> seen = inverse.lab_of_rgb(rgb);
-                c.point[i] = inverse.point(seen);
-                const std::array<float, 3> back = inverse.lab(c.point[i]);
-                c.error[i] = 0;
-                for (int k = 0; k < 3; ++k)
-                    c.error[i] += (seen[k] - back[k]) * (seen[k] - back[k]);
-            }
+            const std::size_t columns = overviews[t]->columns_;
+            parallel_for(std::size_t(overviews[t]->rows_), threads, {}, [&](std::size_t y) {
+                for (std::size_t i = y * columns; i < (y + 1) * columns; ++i) {
+                    if (c.there[i] == 0)
+                        continue;
+                    std::array<float, 3> rgb = c.rgb[i];
+                    std::array<double, 3> back;
+                    if (!lit)
+                        for (float& v : rgb)
+                            v /= std::exp(c.shade[i]);
+                    const std::array<float, 3> seen = inverse.lab_of_rgb(rgb);
+                    const SkinPoint p = inverse.point(seen);
+                    if (lit) {
+                        Vec u{p[0], p[1], 0}, other = lit_search.mean();
+                        const Vec target{seen[0], seen[1], seen[2]};
+                        if (lit_search.descend(other, target) < lit_search.descend(u, target))
+                            u = other;
+                        c.point[i] = {float(u[0]), float(u[1]), usual[2]};
+                        c.shade[i] = float(u[2]);
+                        back = lit_search.lab(u);
+                    } else {
+                        c.point[i] = p;
+                        const std::array<float, 3> look_of = inverse.lab(p);
+                        back = {look_of[0], look_of[1], look_of[2]};
+                    }
+                    for (int k = 0; k < 3; ++k)
+                        c.error[i] += float((seen[k] - back[k]) * (seen[k] - back[k]));
+                }
+            });
         }
         for (int round = 0; round < 4; ++round) {
-            const MaskRule rule = mask_rule(centre, spread, noise_sd);
+            MaskRule rule = mask_rule(centre, spread, noise_sd);
+            if (first_look) {
+                // At first every colour that skin can have by the priors; hair and wood have no blood.
+                for (int k = 0; k < 2; ++k) {
+                    rule.centre[k] = usual[k];
+                    rule.above[k] = rule.below[k] = 2 * float(axes[k].sd);
+                }
+                rule.above_near = rule.hair = 4;
+                first_look = false;
+            }
             std::vector<float> values[3];
             double there = 0;
             for (Cells& c : cells)
                 for (std::size_t i = 0; i < c.rgb.size(); ++i) {
                     there += c.there[i];
-                    // At first every colour that skin can have.
-                    const float far = distance_from_skin(rule, round ? c.point[i][0] : centre[0],
-                                                         round ? c.point[i][1] : centre[1], c.error[i]);
+                    const float far = distance_from_skin(rule, c.point[i][0], c.point[i][1], c.near[i], c.error[i]);
                     c.mask[i] = exp_minus(0.5f * far) * c.there[i];
                     if (c.mask[i] > 0.5f)
                         for (int k = 0; k < 3; ++k)
@@ -941,9 +977,22 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     v = std::abs(v - centre[k]);
                 spread[k] = std::clamp(1.4826f * median_of(values[k]), 0.01f, k == 2 ? 0.1f : 0.5f);
             }
+            for (std::size_t t = 0; t < cells.size(); ++t) {
+                Cells& c = cells[t];
+                const PictureOverview& o = *overviews[t];
+                std::vector<float> melanin(c.rgb.size()), weight(c.rgb.size());
+                for (std::size_t i = 0; i < c.rgb.size(); ++i) {
+                    melanin[i] = c.point[i][0] - centre[0];
+                    weight[i] = c.mask[i] * c.mask[i];
+                }
+                c.near = low_pass(melanin, weight, o.columns_, o.rows_, low_pass_sigma(o), 0.003);
+                for (float& v : c.near)
+                    v += centre[0];
+            }
         }
     };
-    look(0);
+    const bool wants_shading = options.shading != Shading::off;
+    look(0, wants_shading);
 
     // Noise: what changes from texel to texel in the one direction of colour that neither melanin nor blood moves, taken
     // as equal in all directions of the cube roots of RGB. Pores and freckles are not in it.
@@ -1009,7 +1058,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     float error = 0;
                     for (int k = 0; k < 3; ++k)
                         error += (seen[k] - back[k]) * (seen[k] - back[k]);
-                    if (distance_from_skin(rule, p[0], p[1], error) < 1.4f)
+                    if (distance_from_skin(rule, p[0], p[1], p[0], error) < 1.4f)
                         responses.push_back(float(std::abs(response) / 6));
                 }
         }
@@ -1044,39 +1093,36 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         }
 
     // Shading: a factor on all colours, which neither pigment nor blood can feign, if oxygenation is at its prior.
-    double found = 0, feigned = 0, kept = 0;
-    const double sigma_share = 0.07;  // of the longer side: broader than a lip or a cheek's flush, a guess
-    if (options.shading != Shading::off && skin_share > 0) {
-        const Search search(inverse.forward_.data(), true);
-        const auto shade_of = [&](const std::array<float, 3>& lab, const SkinPoint& start) {
-            Vec u{start[0], start[1], 0};
-            search.descend(u, {lab[0], lab[1], lab[2]});
-            return float(u[2]);
+    double found = 0, feigned = 0, kept = 0, exposure = 0;
+    if (wants_shading && skin_share > 0) {
+        const auto light_of = [&](const SkinPoint& p) {
+            const auto lab = inverse.lab(p);
+            Vec u{centre[0], centre[1], 0};
+            lit_search.descend(u, {lab[0], lab[1], lab[2]});
+            return u[2];
         };
         std::vector<float> all;
-        for (std::size_t t = 0; t < cells.size(); ++t) {
-            Cells& c = cells[t];
+        for (Cells& c : cells) {
             c.sure.assign(c.rgb.size(), 0);
-            const int columns = overviews[t]->columns_;
-            parallel_for(std::size_t(overviews[t]->rows_), threads, {}, [&](std::size_t y) {
-                for (std::size_t i = y * columns; i < (y + 1) * columns; ++i)
-                    if (c.mask[i] > 0.25f) {
-                        c.shade[i] = shade_of(inverse.lab_of_rgb(c.rgb[i]), c.point[i]);
-                        c.sure[i] = c.mask[i] * c.mask[i];
-                    }
-            });
             for (std::size_t i = 0; i < c.rgb.size(); ++i)
-                if (c.mask[i] > 0.5f)
-                    all.push_back(c.shade[i]);
+                if (c.mask[i] > 0.25f) {
+                    c.sure[i] = c.mask[i] * c.mask[i];
+                    if (c.mask[i] > 0.5f)
+                        all.push_back(c.shade[i]);
+                }
         }
         const float middle = all.empty() ? 0 : median_of(all);
+        // Light on the whole picture is told from light skin only as far as it is more than the scattering of people differs
+        // (5 to 95 % of measured faces, docs/measured_skin.md, move the lightness of all colours by about as much).
+        constexpr double personal = 0.12;
+        exposure = std::abs(middle) > personal ? middle * (1 - personal * personal / (double(middle) * middle)) : 0;
         double sum = 0, square = 0, weight = 0;
         for (std::size_t t = 0; t < cells.size(); ++t) {
             Cells& c = cells[t];
             for (float& v : c.shade)
                 v = limit(v - middle, -1.5f, 1.5f);
             const PictureOverview& o = *overviews[t];
-            c.shade = low_pass(c.shade, c.sure, o.columns_, o.rows_, std::max(1.0, sigma_share * std::max(o.columns_, o.rows_)), 0.003);
+            c.shade = low_pass(c.shade, c.sure, o.columns_, o.rows_, low_pass_sigma(o), 0.003);
             for (std::size_t i = 0; i < c.rgb.size(); ++i) {
                 sum += double(c.sure[i]) * c.shade[i];
                 square += double(c.sure[i]) * c.shade[i] * c.shade[i];
@@ -1086,26 +1132,31 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         found = weight > 0 ? std::sqrt(std::max(0.0, square / weight - sum / weight * (sum / weight))) : 0;
         SkinPoint low = centre, high = centre;
         low[2] = float(axes[2].mean - axes[2].sd), high[2] = float(axes[2].mean + axes[2].sd);
-        feigned = std::abs(shade_of(inverse.lab(high), centre) - shade_of(inverse.lab(low), centre)) / 2;
+        feigned = std::abs(light_of(high) - light_of(low)) / 2;
         kept = options.shading == Shading::on ? 1.0 : found > feigned ? 1 - feigned * feigned / (found * found) : 0;
         for (Cells& c : cells)
             for (float& v : c.shade)
-                v *= float(kept);
+                v = float(v * kept + exposure);
     }
-    if (kept > 0 || noise_sd > 0)
-        look(noise_sd);
+    const bool shaded = kept > 0 || exposure != 0;
+    if (wants_shading && !shaded)
+        for (Cells& c : cells)
+            c.shade.assign(c.rgb.size(), 0);
+    if (wants_shading || noise_sd > 0)
+        look(noise_sd, false);
 
     std::vector<PictureModel> out;
     for (std::size_t t = 0; t < cells.size(); ++t) {
         const PictureOverview& o = *overviews[t];
         PictureModel m{o.width_, o.height_, factor, noise_sd, centre, spread, skin_share, found, feigned, kept,
-                       o.columns_, o.rows_, o.cell_, {}, {}};
-        if (kept > 0)
+                       exposure, o.columns_, o.rows_, o.cell_, {}, {}, {}};
+        if (shaded)
             for (const float v : cells[t].shade)
                 m.shading.push_back(std::exp(v));
         std::vector<float> weight = cells[t].mask;
         for (float& w : weight)
             w = w > 0.5f ? w * w : 0;
+        m.near = cells[t].near;
         m.fill = filled(cells[t].point, weight, o.columns_, o.rows_, centre);
         out.push_back(std::move(m));
     }
@@ -1174,6 +1225,7 @@ struct TileRow {
 
 struct Tile {
     TileRow ring[window];
+    float near[tile_columns];  ///< ln melanin of the skin around
     float point[3][tile_columns], f[3][tile_columns], lab[3][tile_columns], mask[tile_columns], error[tile_columns];
     float fill[3][tile_columns], out[4][tile_columns];
 };
@@ -1248,7 +1300,7 @@ void mask_row(int n, const MaskRule& rule, const TileRow& row, Tile& tile) {
     for (int i = 0; i < n; ++i) {
         const float l = row.lab[0][i + halo] - tile.lab[0][i], a = row.lab[1][i + halo] - tile.lab[1][i];
         const float b = row.lab[2][i + halo] - tile.lab[2][i];
-        const float far = distance_from_skin(rule, tile.point[0][i], tile.point[1][i], l * l + a * a + b * b);
+        const float far = distance_from_skin(rule, tile.point[0][i], tile.point[1][i], tile.near[i], l * l + a * a + b * b);
         tile.mask[i] = exp_minus(0.5f * far) * row.there[i + halo];
     }
 }
@@ -1366,6 +1418,7 @@ InversionCounts invert_rows(const SkinInverse& inverse, const PictureModel& mode
                     for (int i = 0; i < n; ++i)
                         tile.point[k][i] = row.point[k][i + halo] + model.centre[k];
             look_row(0, n, forward, scale, tile);
+            upsample_inner.read(model.near, 1, 0, y, tile.near);
             mask_row(n, rule, row, tile);
             if (std::any_of(tile.mask, tile.mask + n, [](float m) { return m < 1; })) {
                 for (int k = 0; k < 3; ++k)
