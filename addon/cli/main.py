@@ -71,6 +71,20 @@ def _parser() -> argparse.ArgumentParser:
                      help="let these go where the data lead, for example melanin_blend or bilirubin_umol_per_l")
     fit.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    invert = _verb(verbs, "invert", _invert, "melanin, hemoglobin and oxygenation maps from a colour map")
+    invert.add_argument("albedo", metavar="ALBEDO", help="a picture; face.1001.png or 'face.<UDIM>.png' is the whole set")
+    invert.add_argument("--out-dir", required=True, metavar="DIR",
+                        help="folder for chromophores.exr, error.exr, mask.exr, shading.exr and residual.exr")
+    invert.add_argument("--skin", metavar="SKIN.json", help="one skin, whose other parameters hold for the whole picture")
+    invert.add_argument("--space", default="auto", choices=("auto", "srgb", "linear", "rec709", "rec2020", "acescg"),
+                        help="auto: integers are sRGB-encoded, floats linear; all but srgb are linear (default %(default)s)")
+    invert.add_argument("--shading", default="auto", choices=("off", "auto", "on"),
+                        help="split off light that is baked into the map; auto: as far as it is more than pigment can "
+                             "explain (default %(default)s)")
+    invert.add_argument("--noise", default="auto", metavar="auto|X",
+                        help="standard deviation of the picture's noise in L*a*b* (default %(default)s)")
+    invert.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     bench = _verb(verbs, "bench", _bench, "measure what accuracy costs in time; for a checkout of the sources")
     bench.add_argument("what", choices=["accuracy"], help="accuracy: every solver and setting of the optics")
     bench.add_argument("--quick", action="store_true", help="a few cases, seconds instead of minutes")
@@ -155,6 +169,36 @@ def _fit(options: argparse.Namespace) -> int:
         report = fit_report(spectra, options.specular, free, lambda done, total: progress("fit", done, total) or True)
     if options.specular == "auto":
         print(f"sanguine: specular taken as {report['specular']} (--specular says otherwise)", file=sys.stderr)
+    _answer(report, options.out)
+    return 0
+
+
+def _invert(options: argparse.Namespace) -> int:
+    from ..app.inverting import invert_file
+    from ..app.skin_report import read_skins
+    from ..domain.files import check_file
+    from .progress import reporter
+
+    check_file(options.out)
+    noise = None
+    if options.noise != "auto":
+        try:
+            noise = float(options.noise)
+        except ValueError:
+            noise = -1.0
+        if not 0.0 <= noise < 100.0:
+            raise InputError(f"--noise: {options.noise!r} is not auto or a number from 0 to below 100")
+    skin = None
+    if options.skin is not None:
+        _, skins = read_skins(options.skin)
+        if len(skins) != 1:
+            raise InputError(f"{options.skin}: skins: {len(skins)} of them, one is needed")
+        skin = skins[0]
+    with reporter(options.json_progress) as progress:
+        report = invert_file(options.albedo, options.out_dir, skin=skin, space=options.space, shading=options.shading,
+                             noise=noise, progress=progress)
+    for warning in report["warnings"]:
+        print(f"sanguine: {warning}", file=sys.stderr)
     _answer(report, options.out)
     return 0
 

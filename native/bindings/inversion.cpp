@@ -172,7 +172,7 @@ void bind_inversion(nb::module_& m) {
                  o.add(in, threads);
              },
              "rows"_a, "first"_a = 0, "srgb"_a = false, "threads"_a = 0,
-             "Rows (N, width, 3 or 4) float32 from row `first` on, each row once and in order; the fourth channel is alpha.\n"
+             "Rows (N, width, 3 or 4) float32 from row `first` on, each row once, in any order; the fourth channel is alpha.\n"
              "srgb: encoded as sRGB, else linear. How the rows are cut does not matter.");
 
     nb::class_<PictureModel>(m, "PictureModel", "Noise, shading and what is skin in a picture.")
@@ -199,7 +199,7 @@ void bind_inversion(nb::module_& m) {
         .def_ro("texels", &InversionCounts::texels)
         .def_ro("there", &InversionCounts::there, "Texels that are finite and whose alpha is above 0.")
         .def_ro("skin", &InversionCounts::skin, "Texels with a mask above 1/2.")
-        .def("error_at", &InversionCounts::error_at, "share"_a, "Delta E 2000 below which this share of the texels lies.")
+        .def("error_at", &InversionCounts::error_at, "share"_a, "Delta E 2000 below which this share of the skin lies.")
         .def("point_at", &InversionCounts::point_at, "axis"_a, "share"_a,
              "Value of an axis of inversion_axes() below which this share of the skin lies.");
 

@@ -87,12 +87,12 @@ struct PictureRows {
     bool srgb;  ///< encoded as IEC 61966-2-1; false: linear
 };
 
-/// A small picture of a large one, and samples of its noise. Rows are added once each, in order.
+/// A small picture of a large one, and samples of its noise. Rows are added once each, in any order.
 class PictureOverview {
 public:
     PictureOverview(int width, int height);
 
-    /// Throws std::invalid_argument for rows of another width or out of order.
+    /// Throws std::invalid_argument for rows that the picture does not have or that were added before.
     void add(const PictureRows& rows, int threads);
 
     int width() const { return width_; }
@@ -101,10 +101,11 @@ public:
 private:
     friend struct InversionKernel;
 
-    int width_, height_, next_ = 0;
+    int width_, height_;
+    std::vector<char> added_;                  ///< rows
     bool srgb_ = false;                        ///< of the rows
     int cell_, columns_, rows_;                ///< texels per side of a cell; cells
-    std::vector<double> sums_;                 ///< [cell][4]: linear RGB and alpha
+    std::vector<std::int64_t> sums_;           ///< [cell][4]: linear RGB times alpha, alpha; fixed point
     int step_x_, step_y_, sample_columns_, sample_rows_;
     std::vector<float> samples_;               ///< [sample row][3 rows][sample column][3 columns][3]: cube root of RGB
 };
@@ -142,12 +143,13 @@ std::vector<PictureModel> picture_models(const SkinInverse& inverse, std::span<c
 struct InversionCounts {
     static constexpr int bins = 2048;
     static constexpr double error_step = 0.02;      ///< bins of Delta E; the last one holds all above
-    std::array<std::uint64_t, bins> error{};        ///< over texels that are there
-    std::array<std::array<std::uint64_t, bins>, 3> point{};  ///< per axis from lower to upper, over skin (mask > 1/2)
+    // Over skin, which is where the mask is above 1/2:
+    std::array<std::uint64_t, bins> error{};
+    std::array<std::array<std::uint64_t, bins>, 3> point{};  ///< per axis from lower to upper
     std::uint64_t texels = 0, there = 0, skin = 0;
 
     void operator+=(const InversionCounts& other);
-    /// Value below which `share` of the texels lie.
+    /// Value below which `share` of the skin lies.
     double error_at(double share) const;
     double point_at(int axis, double share) const;
 };

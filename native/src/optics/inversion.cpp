@@ -680,6 +680,8 @@ std::array<float, 3> SkinInverse::rgb_of_lab(const std::array<float, 3>& lab) co
 namespace {
 constexpr int overview_side = 256;
 constexpr int sample_side = 224;
+constexpr double sum_unit = 1 << 24;  ///< of the sums over a cell
+constexpr double sum_limit = 1e7;     ///< of one row of a cell: 65536 rows of it fit into the integers
 }  // namespace
 
 PictureOverview::PictureOverview(int width, int height) : width_(width), height_(height) {
@@ -689,6 +691,7 @@ PictureOverview::PictureOverview(int width, int height) : width_(width), height_
     cell_ = (side + overview_side - 1) / overview_side;
     columns_ = (width + cell_ - 1) / cell_;
     rows_ = (height + cell_ - 1) / cell_;
+    added_.assign(height, 0);
     sums_.resize(std::size_t(columns_) * rows_ * 4);
     step_x_ = std::max(3, width / sample_side);
     step_y_ = std::max(3, height / sample_side);
@@ -698,12 +701,14 @@ PictureOverview::PictureOverview(int width, int height) : width_(width), height_
 }
 
 void PictureOverview::add(const PictureRows& in, int threads) {
-    if (in.width != width_ || in.first != next_ || in.count < 0 || in.first + in.count > height_)
-        throw std::invalid_argument("rows " + std::to_string(in.first) + " to " + std::to_string(in.first + in.count)
-                                    + " of " + std::to_string(in.width) + " texels: the picture of "
-                                    + std::to_string(width_) + " x " + std::to_string(height_) + " goes on at row "
-                                    + std::to_string(next_));
     const int last = in.first + in.count, channels = in.channels;
+    const auto rows = [&] { return "rows " + std::to_string(in.first) + " to " + std::to_string(last); };
+    if (in.width != width_ || in.first < 0 || in.count < 0 || last > height_)
+        throw std::invalid_argument(rows() + " of " + std::to_string(in.width) + " texels: not of a picture of "
+                                    + std::to_string(width_) + " x " + std::to_string(height_));
+    if (std::find(added_.begin() + in.first, added_.begin() + last, 1) != added_.begin() + last)
+        throw std::invalid_argument(rows() + ": not all are new");
+    std::fill(added_.begin() + in.first, added_.begin() + last, 1);
     srgb_ = in.srgb;
     const int first_cell = in.first / cell_, cells = in.count == 0 ? 0 : (last - 1) / cell_ - first_cell + 1;
     parallel_for(std::size_t(cells), threads, {}, [&](std::size_t k) {
@@ -725,7 +730,7 @@ void PictureOverview::add(const PictureRows& in, int threads) {
             if (in.srgb)
                 decode_rows(width_, r, g, b);
             for (int column = 0; column < columns_; ++column) {
-                double sum[4] = {};
+                double sum[4] = {};  // of one row; rows are added up as integers, in whatever order they come
                 for (int x = column * cell_; x < std::min(width_, (column + 1) * cell_); ++x) {
                     sum[0] += double(alpha[x]) * r[x];
                     sum[1] += double(alpha[x]) * g[x];
@@ -733,7 +738,7 @@ void PictureOverview::add(const PictureRows& in, int threads) {
                     sum[3] += alpha[x];
                 }
                 for (int c = 0; c < 4; ++c)
-                    sums_[(std::size_t(row) * columns_ + column) * 4 + c] += sum[c];
+                    sums_[(std::size_t(row) * columns_ + column) * 4 + c] += std::llround(std::min(sum[c], sum_limit) * sum_unit);
             }
             const int sample = y / step_y_, within = y % step_y_;
             if (within < 3 && sample < sample_rows_)
@@ -749,7 +754,6 @@ void PictureOverview::add(const PictureRows& in, int threads) {
                     }
         }
     });
-    next_ = last;
 }
 
 // ---- The model of a picture
@@ -772,41 +776,35 @@ struct Cells {
     std::vector<float> shade, sure;         ///< ln of the light, and how sure
 };
 
-/// Gaussian means, each texel with its weight; `base` pulls to 0 where little weight is near.
+/// Sums over 2 reach + 1 neighbours of `count` values that lie `stride` apart.
+void box_sums(double* values, int count, std::size_t stride, int reach, std::vector<double>& line) {
+    line.resize(count + 1);
+    line[0] = 0;
+    for (int i = 0; i < count; ++i)
+        line[i + 1] = line[i] + values[i * stride];
+    for (int i = 0; i < count; ++i)
+        values[i * stride] = line[std::min(i + reach + 1, count)] - line[std::max(i - reach, 0)];
+}
+
+/// Nearly Gaussian means (three boxes), each texel with its weight; `base` pulls to 0 where little weight is near.
 std::vector<float> low_pass(const std::vector<float>& values, const std::vector<float>& weights, int columns, int rows,
                             double sigma, double base) {
-    const int reach = int(std::ceil(3 * sigma));
-    std::vector<double> kernel(reach + 1);
-    for (int k = 0; k <= reach; ++k)
-        kernel[k] = std::exp(-0.5 * k * k / (sigma * sigma));
+    const int reach = std::max(1, int(std::lround((std::sqrt(4 * sigma * sigma + 1) - 1) / 2)));
     const std::size_t count = values.size();
-    std::vector<double> top(count), bottom(count), weight(count), total(count);
-    for (int y = 0; y < rows; ++y)
-        for (int x = 0; x < columns; ++x) {
-            double a = 0, b = 0;
-            for (int k = std::max(-reach, -x); k <= std::min(reach, columns - 1 - x); ++k) {
-                const std::size_t i = std::size_t(y) * columns + x + k;
-                a += kernel[std::abs(k)] * weights[i] * values[i];
-                b += kernel[std::abs(k)] * weights[i];
-            }
-            top[std::size_t(y) * columns + x] = a, weight[std::size_t(y) * columns + x] = b;
-        }
-    std::vector<float> out(count);
-    double largest = 0;
-    for (int y = 0; y < rows; ++y)
-        for (int x = 0; x < columns; ++x) {
-            double a = 0, b = 0;
-            for (int k = std::max(-reach, -y); k <= std::min(reach, rows - 1 - y); ++k) {
-                const std::size_t i = std::size_t(y + k) * columns + x;
-                a += kernel[std::abs(k)] * top[i];
-                b += kernel[std::abs(k)] * weight[i];
-            }
-            const std::size_t i = std::size_t(y) * columns + x;
-            bottom[i] = a, total[i] = b;
-            largest = std::max(largest, b);
-        }
+    std::vector<double> top(count), bottom(weights.begin(), weights.end()), line;
     for (std::size_t i = 0; i < count; ++i)
-        out[i] = largest > 0 ? float(bottom[i] / (total[i] + base * largest)) : 0.0f;
+        top[i] = double(weights[i]) * values[i];
+    for (std::vector<double>* plane : {&top, &bottom})
+        for (int pass = 0; pass < 3; ++pass) {
+            for (int y = 0; y < rows; ++y)
+                box_sums(plane->data() + std::size_t(y) * columns, columns, 1, reach, line);
+            for (int x = 0; x < columns; ++x)
+                box_sums(plane->data() + x, rows, columns, reach, line);
+        }
+    const double largest = std::max(*std::max_element(bottom.begin(), bottom.end()), 1e-30);
+    std::vector<float> out(count);
+    for (std::size_t i = 0; i < count; ++i)
+        out[i] = float(top[i] / (std::max(bottom[i], 0.0) + base * largest));
     return out;
 }
 
@@ -880,9 +878,9 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
     std::vector<Cells> cells(overviews.size());
     for (std::size_t t = 0; t < overviews.size(); ++t) {
         const PictureOverview& o = *overviews[t];
-        if (o.next_ != o.height_)
-            throw std::invalid_argument("overview: " + std::to_string(o.next_) + " of " + std::to_string(o.height_)
-                                        + " rows were added");
+        if (const auto missing = std::find(o.added_.begin(), o.added_.end(), 0); missing != o.added_.end())
+            throw std::invalid_argument("overview: row " + std::to_string(missing - o.added_.begin()) + " of "
+                                        + std::to_string(o.height_) + " was not added");
         const std::size_t count = std::size_t(o.columns_) * o.rows_;
         cells[t].rgb.assign(count, {});
         cells[t].there.resize(count);
@@ -891,11 +889,11 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         for (std::size_t i = 0; i < count; ++i) {
             const int x = int(i % o.columns_) * o.cell_, y = int(i / o.columns_) * o.cell_;
             const double area = double(std::min(o.cell_, o.width_ - x)) * std::min(o.cell_, o.height_ - y);
-            const double alpha = o.sums_[i * 4 + 3];
+            const double alpha = double(o.sums_[i * 4 + 3]) / sum_unit;
             cells[t].there[i] = float(alpha / area);
             if (alpha > 0)
                 for (int c = 0; c < 3; ++c)
-                    cells[t].rgb[i][c] = float(std::min(o.sums_[i * 4 + c] / alpha, 1e4));
+                    cells[t].rgb[i][c] = float(std::min(double(o.sums_[i * 4 + c]) / sum_unit / alpha, 1e4));
         }
     }
 
@@ -927,10 +925,14 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     const std::array<float, 3> seen = inverse.lab_of_rgb(rgb);
                     const SkinPoint p = inverse.point(seen);
                     if (lit) {
-                        Vec u{p[0], p[1], 0}, other = lit_search.mean();
+                        Vec u{p[0], p[1], 0};
                         const Vec target{seen[0], seen[1], seen[2]};
-                        if (lit_search.descend(other, target) < lit_search.descend(u, target))
-                            u = other;
+                        // From elsewhere too where the colour is hard to explain.
+                        if (const double cost = lit_search.descend(u, target); cost > 10) {
+                            Vec other = lit_search.mean();
+                            if (lit_search.descend(other, target) < cost)
+                                u = other;
+                        }
                         c.point[i] = {float(u[0]), float(u[1]), usual[2]};
                         c.shade[i] = float(u[2]);
                         back = lit_search.lab(u);
@@ -1456,9 +1458,9 @@ InversionCounts invert_rows(const SkinInverse& inverse, const PictureModel& mode
             for (int i = 0; i < n; ++i)
                 if (row.there[i + halo] > 0) {
                     ++own.there;
-                    ++own.error[int(limit(tile.error[i] * float(1 / InversionCounts::error_step), 0, InversionCounts::bins - 1))];
                     if (tile.mask[i] > 0.5f) {
                         ++own.skin;
+                        ++own.error[int(limit(tile.error[i] * float(1 / InversionCounts::error_step), 0, InversionCounts::bins - 1))];
                         for (int k = 0; k < 3; ++k)
                             ++own.point[k][int(limit((tile.point[k][i] - point_begin[k]) * point_scale[k], 0, InversionCounts::bins - 1))];
                     }
