@@ -153,6 +153,7 @@ void bind_inversion(nb::module_& m) {
              "skin: (P,) in the order of parameters(). working_space: of the pictures, as in linear_rgb(). nodes: per axis of\n"
              "L*a*b*, 5 to 129. progress(done, total) is called a few times a second; False raises Cancelled.")
         .def_prop_ro("nodes", &SkinInverse::nodes)
+        .def_prop_ro("lab_range", &SkinInverse::lab_range, "L*a*b* of the first and of the last nodes.")
         .def_prop_ro("bytes", &SkinInverse::bytes, "Size of the tables.")
         .def("lab", [](const SkinInverse& s, const TriplesIn& points) { return map_triples(points, [&](const auto& p) { return s.lab(p); }); },
              "points"_a, "L*a*b* (N, 3) of skin points (N, 3), as the forward table has it.")

@@ -56,6 +56,8 @@ public:
 
     const SkinParameters& skin() const { return skin_; }
     int nodes() const { return nodes_; }
+    /// L*a*b* of the table's first and last nodes.
+    std::array<std::array<float, 3>, 2> lab_range() const;
     std::size_t bytes() const { return (forward_.size() + inverse_.size()) * sizeof(float); }
 
     /// L*a*b* of a skin, as the forward table has it.

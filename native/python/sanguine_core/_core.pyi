@@ -29,6 +29,159 @@ def fit(spectra: Annotated[NDArray[numpy.float64], dict(shape=(None, None), orde
     progress(done, total) is called on this thread a few times a second; False raises Cancelled.
     """
 
+INVERSION_HALO: int = 3
+
+INVERSION_NODES: int = 33
+
+def inversion_axes() -> list:
+    """
+    The axes of a skin point, ln melanin, ln hemoglobin and oxygenation, as dicts: id, lower and upper, mean and sd
+    of the prior, all on the axis; source.
+    """
+
+class SkinInverse:
+    """
+    Tables from colour to skin point for one skin, of which all but melanin, hemoglobin and
+    oxygenation is given. Immutable; a few megabytes.
+    """
+
+    def __init__(self, skin: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], working_space: str | Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)] = 'rec709', nodes: int = 33, threads: int = 0, progress: Callable | None = None) -> None:
+        """
+        skin: (P,) in the order of parameters(). working_space: of the pictures, as in linear_rgb(). nodes: per axis of
+        L*a*b*, 5 to 129. progress(done, total) is called a few times a second; False raises Cancelled.
+        """
+
+    @property
+    def nodes(self) -> int: ...
+
+    @property
+    def lab_range(self) -> list[list[float]]:
+        """L*a*b* of the first and of the last nodes."""
+
+    @property
+    def bytes(self) -> int:
+        """Size of the tables."""
+
+    def lab(self, points: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """L*a*b* (N, 3) of skin points (N, 3), as the forward table has it."""
+
+    def point(self, lab: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """Skin points (N, 3) of L*a*b* (N, 3), as the inverse table has it."""
+
+    def lab_of_rgb(self, rgb: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """L*a*b* (N, 3) of linear RGB (N, 3) of the working space."""
+
+    def rgb_of_lab(self, lab: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """Linear RGB (N, 3) of the working space of L*a*b* (N, 3)."""
+
+class PictureOverview:
+    """A small picture of a large one, and samples of its noise."""
+
+    def __init__(self, width: int, height: int) -> None: ...
+
+    def add(self, rows: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], first: int = 0, srgb: bool = False, threads: int = 0) -> None:
+        """
+        Rows (N, width, 3 or 4) float32 from row `first` on, each row once, in any order; the fourth channel is alpha.
+        srgb: encoded as sRGB, else linear. How the rows are cut does not matter.
+        """
+
+class PictureModel:
+    """Noise, shading and what is skin in a picture."""
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def height(self) -> int: ...
+
+    @property
+    def noise_sd(self) -> float:
+        """Standard deviation of the noise, mean over L*, a*, b*."""
+
+    @property
+    def centre(self) -> list[float]:
+        """Median skin point of the skin."""
+
+    @property
+    def spread(self) -> list[float]:
+        """Robust standard deviation of the skin's points."""
+
+    @property
+    def skin_share(self) -> float: ...
+
+    @property
+    def shading_found(self) -> float:
+        """Standard deviation of ln shading, before what is kept of it."""
+
+    @property
+    def shading_pigment(self) -> float:
+        """The same as oxygenation alone could feign it."""
+
+    @property
+    def exposure(self) -> float:
+        """ln of a factor on the whole picture that is in the shading."""
+
+    @property
+    def shading_kept(self) -> float:
+        """Share of the found shading that is kept, 0 to 1."""
+
+def picture_models(inverse: SkinInverse, overviews: Sequence[PictureOverview], shading: str = 'auto', noise: float | None = None, quantum: float = 0.0, threads: int = 0) -> list[PictureModel]:
+    """
+    Models of pictures that belong together, as the tiles of a UDIM set do.
+
+    shading: 'off', 'auto' (as far as it is more than pigment explains) or 'on'. noise: standard deviation in L*a*b*;
+    None estimates it. quantum: step between two values of the file, 1/255 for 8 bits, 0 for floats.
+    """
+
+class InversionCounts:
+    """Counts over texels, to be added up over bands and tiles."""
+
+    def __init__(self) -> None: ...
+
+    def __iadd__(self, arg: InversionCounts, /) -> InversionCounts: ...
+
+    @property
+    def texels(self) -> int: ...
+
+    @property
+    def there(self) -> int:
+        """Texels that are finite and whose alpha is above 0."""
+
+    @property
+    def skin(self) -> int:
+        """Texels with a mask above 1/2."""
+
+    def error_at(self, share: float) -> float:
+        """Delta E 2000 below which this share of the skin lies."""
+
+    def point_at(self, axis: int, share: float) -> float:
+        """
+        Value of an axis of inversion_axes() below which this share of the skin lies.
+        """
+
+def invert_rows(inverse: SkinInverse, model: PictureModel, rows: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], rows_first: int, first: int, count: int, srgb: bool = False, shaded_residual: bool = False, wanted: Sequence[str] = ['skin_map', 'residual', 'mask', 'error'], threads: int = 0, progress: Callable | None = None) -> dict:
+    """
+    Chromophores of the rows `first` to `first + count` of a picture.
+
+    Parameters
+    ----------
+    rows : (N, width, 3 or 4) float32, from row `rows_first` on: the wanted ones and INVERSION_HALO more on either side,
+        where the picture has them
+    srgb : encoded as sRGB, else linear
+    shaded_residual : the shading is in the residual
+    wanted : any of skin_map, residual, mask, error, shading
+
+    Returns
+    -------
+    dict of float32 arrays, and "counts" (InversionCounts): skin_map (count, width, 4): hemoglobin, melanin, oil, oxygenation;
+    residual (count, width, 3): picture / (look of the estimate x shading); mask: probability of skin; error: CIEDE2000 between
+    picture / shading and the look of the estimate; shading: factor on the light. How the rows are cut and the number of threads
+    change nothing.
+    """
+
+def delta_e_2000_fast(lab_1: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], lab_2: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None,))]:
+    """CIEDE2000 (N,) in single precision, as invert_rows() computes it."""
+
 class Cancelled(Exception):
     pass
 

@@ -459,17 +459,17 @@ struct MaskRule {
 };
 
 MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double noise_sd) {
-    // Melanin is judged by what is near, because light and sun change slowly over a face and hair does not. Freckles have up to two and a half times the melanin of the skin around (guess: their contrast of 5-10 L* at -11 L*
-    // per factor e), lips 4.5 times its blood (rigs/anatomy.toml): both have to pass. Hair has much more melanin and no
-    // blood: together these tell it even where either alone could be skin.
+    // Freckles have up to four times the melanin of the skin around (features/freckles.cpp), lips 4.5 times its blood
+    // (rigs/anatomy.toml): both have to pass. Hair has more melanin and no blood: together these tell it even where either
+    // alone could be skin. Melanin is judged by what is near, because light and sun change slowly over a face.
     MaskRule r;
     r.centre[0] = centre[0], r.centre[1] = centre[1];
     r.above[0] = std::clamp(3 * spread[0], 1.2f, 1.6f);
     r.below[0] = std::clamp(3 * spread[0], 1.0f, 1.6f);
     r.above[1] = std::clamp(3.5f * spread[1], 1.9f, 2.5f);
     r.below[1] = std::clamp(3.5f * spread[1], 1.4f, 1.8f);
-    r.above_near = 0.95f;
-    r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.0f, 1.2f);
+    r.above_near = 1.3f;
+    r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.3f, 1.5f);
     r.error_free = float(3 + 2 * noise_sd);
     return r;
 }
@@ -643,6 +643,13 @@ struct InversionKernel {
     static std::vector<PictureModel> models(const SkinInverse&, std::span<const PictureOverview* const>,
                                             const InversionOptions&, int threads);
 };
+
+std::array<std::array<float, 3>, 2> SkinInverse::lab_range() const {
+    std::array<std::array<float, 3>, 2> out{lab_begin_, lab_begin_};
+    for (int k = 0; k < 3; ++k)
+        out[1][k] += float(nodes_ - 1) / lab_scale_[k];
+    return out;
+}
 
 std::array<float, 3> SkinInverse::lab(const SkinPoint& p) const {
     float f[4];
