@@ -174,6 +174,28 @@ TEST(Texels, BeyondTheRimShowTheNearestPlace) {
     }
 }
 
+TEST(Texels, BeyondASeamShowTheSkinOfTheOtherIsland) {
+    OwnedSkin skin = ball_skin(85, 32);
+    for (glm::vec2& uv : skin.uv) uv.x = 0.25F + 0.5F * uv.x;  // the seam at columns 64 and 192
+    const SkinSurface surface = skin.surface();
+    const TexelMap map = map_texels(surface, 256, 256, 3, 0);
+    int compared = 0;
+    for (std::size_t i = 0; i + 1 < map.texel.size(); ++i) {
+        const std::uint32_t column = map.texel[i] % 256, row = map.texel[i] / 256;
+        // Near the equator, where both islands have the same straight texels.
+        if (column < 61 || column >= 64 || row < 112 || row >= 144) continue;
+        const auto other = std::ranges::lower_bound(map.texel, map.texel[i] + 128) - map.texel.begin();
+        ASSERT_EQ(map.texel[std::size_t(other)], map.texel[i] + 128);
+        const SkinPlace& here = map.place[i];
+        const SkinPlace& there = map.place[std::size_t(other)];
+        // The cells narrow toward the poles, by 2 % in this band: over 2.5 texels and 16 rows some tenth of a texel.
+        // The nearest place would be half a texel away and more.
+        EXPECT_LT(glm::distance(here.place_mm, there.place_mm), 0.3F * here.size_mm) << column << ' ' << row;
+        ++compared;
+    }
+    EXPECT_EQ(compared, 3 * 32);
+}
+
 TEST(Texels, BothSidesOfASeamHaveTheSameSize) {
     const OwnedSkin skin = ball_skin(85, 32);
     const SkinSurface surface = skin.surface();

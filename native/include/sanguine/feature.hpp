@@ -83,8 +83,8 @@ std::span<const Feature* const> features();
 /// Throws std::invalid_argument that names the id and the known ones.
 const Feature& feature(std::string_view id);
 
-/// The texels of a UV layout: those within `padding_px` of the mesh show the nearest place of it, so that filtering
-/// across a seam finds skin on both sides.
+/// The texels of a UV layout. Those within `padding_px` of an island show the skin beyond its edge, which is on another
+/// island, so that filtering across a seam finds the same on both sides; at a rim of the mesh the nearest place.
 struct TexelMap {
     int width, height;
     std::vector<std::uint32_t> texel;  ///< row * width + column, row 0 is V = 0; ascending

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
+#include "surface_walk.hpp"
 #include "uv_raster.hpp"
 
 namespace sanguine {
@@ -19,23 +21,61 @@ void require(bool condition, const std::string& message) {
     if (!condition) throw std::invalid_argument(message);
 }
 
-/// Side of a texel at each welded vertex: the skin round it by the area of that skin in the image. Being a value of the
-/// vertex it is the same on both sides of a seam, and changes smoothly from triangle to triangle.
+/// Side of a texel at each welded vertex: the skin round it by the area of that skin in the image, on a seam in the
+/// island with the largest texels: what those cannot hold has to be filtered on the other side as well. Being a value
+/// of the vertex it is the same on both sides, and changes smoothly from triangle to triangle.
 std::vector<float> texel_size_mm(const SkinSurface& surface, double texels) {
-    std::vector<double> skin_mm2(surface.position_mm().size(), 0), image(skin_mm2.size(), 0);
+    struct Corner {
+        std::uint32_t vertex;
+        float u, v;  // corners of a vertex at one place in UV are of one island
+        double skin_mm2, image;
+    };
+    std::vector<Corner> corners;
+    corners.reserve(3 * surface.triangles().size());
     for (std::size_t i = 0; i < surface.triangles().size(); ++i) {
         const UvTriangle t = corners_of(surface.uv(), surface.corners()[i]);
         if (is_degenerate(t) || surface.triangle_area_mm2()[i] == 0) continue;
         for (int k = 0; k < 3; ++k) {
-            const std::uint32_t vertex = surface.triangles()[i][k];
-            skin_mm2[vertex] += surface.triangle_area_mm2()[i];
-            image[vertex] += std::abs(twice_area(t)) / 2;
+            const glm::vec2 uv = surface.uv()[surface.corners()[i][k]];
+            corners.push_back({surface.triangles()[i][k], uv.x, uv.y, surface.triangle_area_mm2()[i],
+                               std::abs(twice_area(t)) / 2});
         }
     }
-    std::vector<float> size(skin_mm2.size(), 0);
-    for (std::size_t v = 0; v < size.size(); ++v)
-        if (image[v] > 0) size[v] = float(std::sqrt(skin_mm2[v] / (image[v] * texels)));
+    const auto place = [](const Corner& c) { return std::tuple(c.vertex, c.u, c.v); };
+    std::ranges::stable_sort(corners, {}, place);
+    std::vector<float> size(surface.position_mm().size(), 0);
+    for (std::size_t i = 0; i < corners.size();) {
+        const std::size_t first = i;
+        double skin_mm2 = 0, image = 0;
+        for (; i < corners.size() && place(corners[i]) == place(corners[first]); ++i) {
+            skin_mm2 += corners[i].skin_mm2;
+            image += corners[i].image;
+        }
+        float& largest = size[corners[first].vertex];
+        largest = std::max(largest, float(std::sqrt(skin_mm2 / (image * texels))));
+    }
     return size;
+}
+
+/// Texels beyond an edge show a place on it; few others do.
+bool is_inside(glm::vec3 barycentric) { return std::min({barycentric.x, barycentric.y, barycentric.z}) > 0; }
+
+/// What a texel shows whose centre lies beyond the edge of its island: the place beyond that edge on the skin, which is
+/// on another island, so that a look-up at the edge finds on this side what it finds on the other one. At a rim of the
+/// mesh it is the nearest place.
+SurfacePoint beyond_edge(const SkinSurface& surface, const SurfacePoint& nearest, glm::dvec2 uv, double most_mm) {
+    const UvTriangle t = corners_of(surface.uv(), surface.corners()[nearest.triangle]);
+    const glm::uvec3 corner = surface.triangles()[nearest.triangle];
+    const glm::dvec3 b(nearest.barycentric);
+    const glm::dvec2 left = uv - (b.x * t[0] + b.y * t[1] + b.z * t[2]);
+    const glm::dvec3 p0(surface.position_mm()[corner.x]), p1(surface.position_mm()[corner.y]),
+        p2(surface.position_mm()[corner.z]);
+    const glm::dvec3 way = (cross(left, t[2] - t[0]) * (p1 - p0) + cross(t[1] - t[0], left) * (p2 - p0)) / twice_area(t);
+    const double length_mm = glm::length(way);
+    if (!(length_mm > 1e-6)) return nearest;
+    SurfaceWalk walk(surface, nearest, way);
+    walk.advance(std::min(length_mm, most_mm));
+    return walk.point();
 }
 
 }  // namespace
@@ -75,9 +115,16 @@ TexelMap map_texels(const SkinSurface& surface, int width, int height, int paddi
         band.place.reserve(std::size_t(count));
         for (std::size_t i = 0; i < shown.size(); ++i) {
             if (shown[i].triangle == SkinSurface::none) continue;
-            band.texel.push_back(std::uint32_t(start + i));
-            band.place.push_back({surface.place_mm(shown[i]), surface.normal_at(shown[i]),
-                                  surface.value_at(shown[i], size_mm), shown[i]});
+            const std::size_t texel = start + i;
+            const glm::dvec2 uv((double(texel % std::size_t(width)) + 0.5) / width,
+                                (double(texel / std::size_t(width)) + 0.5) / height);
+            // Texels of a seam may differ in size, and an island with hardly any has no say in how far to go.
+            const double most_mm = 2.0 * padding_px * double(surface.value_at(shown[i], size_mm));
+            const SurfacePoint point =
+                is_inside(shown[i].barycentric) ? shown[i] : beyond_edge(surface, shown[i], uv, most_mm);
+            band.texel.push_back(std::uint32_t(texel));
+            band.place.push_back(
+                {surface.place_mm(point), surface.normal_at(point), surface.value_at(point, size_mm), point});
         }
     });
 

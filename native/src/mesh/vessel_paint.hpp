@@ -35,8 +35,13 @@ public:
     glm::vec2 at(const SkinPlace& place) const;
 
 private:
-    std::vector<VesselStroke> strokes_;
-    PlaceGrid fine_, coarse_;  // for texels up to two sizes
+    struct Piece {
+        glm::vec3 from_mm, along, normal;  // `along` is unit
+        float length_mm, blur2_mm2;
+        glm::vec2 amount_mm;
+    };
+    std::vector<Piece> pieces_;
+    std::vector<PlaceGrid> grids_;  // for texels up to a size each
 };
 
 }  // namespace sanguine

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "standard_face.hpp"
 #include "list.hpp"
 #include "noise.hpp"
 #include "random.hpp"
 #include "scatter.hpp"
+#include "standard_face.hpp"
 #include "vessel_paint.hpp"
 #include "vessel_tree.hpp"
 
@@ -21,8 +21,8 @@ constexpr float degree = 3.14159265F / 180;
 
 /// Share of the face that they cover. Median 0.95 % in women and 0.76 % in men at a median age of 66.9, measured on
 /// photographs (Hamer et al., Rotterdam Study); 1.7 % more per year (Mekic et al. 2020, J. Eur. Acad. Dermatol.
-/// Venereol. 34:821). The sun's factor (0.5 to 1.5) and the absence in children are guesses; that sun and age act together:
-/// Kennedy et al. 2003, J. Invest. Dermatol. 120:548.
+/// Venereol. 34:821). The sun's factor (0.5 to 1.5) and the absence in children are guesses; that sun and age act
+/// together: Kennedy et al. 2003, J. Invest. Dermatol. 120:548.
 float covered_share(const Person& person) {
     const float age = float(person.age_years);
     const float sex = 0.0095F + (0.0076F - 0.0095F) * float(person.masculinity);

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "standard_face.hpp"
 #include "list.hpp"
 #include "noise.hpp"
 #include "random.hpp"
+#include "standard_face.hpp"
 #include "vessel_paint.hpp"
 #include "vessel_tree.hpp"
 
@@ -42,8 +42,8 @@ constexpr Root roots[] = {
     {{44, 4, -9}, {-1, -0.25F, -0.3F}, 0.42F, 24, 7, 0.45F, 0},          // lower lid, from the outer corner
     {{18, -9, 7}, {1, 0.1F, 0.2F}, 0.27F, 24, 8, 0.5F, 0},               // upper lid
     {{14, -14, -5}, {0.3F, -0.1F, -1}, 0.45F, 42, 18, 1.1F, 0},          // angular, beside the nose
-    {{57, 66, -84}, {-0.05F, -0.1F, -1}, 0.95F, 110, 45, 1.3F, 0.12F},   // external jugular
-    {{13, 14, -112}, {0, 0.1F, -1}, 0.7F, 80, 35, 1.3F, 0.05F},          // anterior jugular
+    {{57, 66, -84}, {-0.05F, -0.1F, -1}, 1.15F, 110, 45, 2.8F, 0.12F},   // external jugular
+    {{13, 14, -112}, {0, 0.1F, -1}, 0.85F, 80, 35, 2.8F, 0.05F},          // anterior jugular
 };
 
 class Grown final : public GrownFeature {

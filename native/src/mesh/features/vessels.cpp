@@ -5,12 +5,12 @@
 
 #include <glm/geometric.hpp>
 
-#include "standard_face.hpp"
 #include "features/vessels.hpp"
 #include "list.hpp"
 #include "noise.hpp"
 #include "random.hpp"
 #include "scatter.hpp"
+#include "standard_face.hpp"
 #include "vessel_paint.hpp"
 #include "vessel_tree.hpp"
 
@@ -146,8 +146,8 @@ private:
 };
 
 /// Fronds branch at acute angles on both sides, candelabra near right angles with arms that turn up again (Moretti
-/// 1959; Kalra and Magnenat-Thalmann 1994). Small branches leave at wide angles, large ones at narrow ones (Murray 1926,
-/// J. Gen. Physiol. 9:835). The angles of the patterns in degrees are guesses.
+/// 1959; Kalra and Magnenat-Thalmann 1994). Small branches leave at wide angles, large ones at narrow ones (Murray
+/// 1926, J. Gen. Physiol. 9:835). The angles of the patterns in degrees are guesses.
 VesselHabit habit_in(const Bed& bed, int order) {
     const float between = 1 - bed.frond - bed.candelabra;
     VesselHabit habit;
