@@ -10,7 +10,7 @@ from ..domain.plan import Plan, make_plan
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .properties import map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
-from .surface import face_regions
+from .surface import face_regions, find_face_regions
 
 
 def active_face(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -69,6 +69,7 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             add_controls(rig)
             driven = drive_shape_keys(rig, [child for child in (face, *rig.children) if child.type == "MESH"])
             measure_maps(face)
+            regions = find_face_regions(face)
             plan = live_plan(face)
             apply_skin(face, rig, plan, skin_slot(face))
         except (ValueError, RuntimeError) as error:
@@ -76,7 +77,8 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             return {"CANCELLED"}
         context.scene.cycles.shading_system = True
         running = ", ".join(effect.label for effect in plan.active)
-        self.report({"INFO"}, f"{running}; {plan.entries} skins solved; {len(driven.driven)} shape keys driven")
+        done = f"{running}; {plan.entries} skins solved; {len(driven.driven)} shape keys driven"
+        self.report({"INFO"}, f"{done}; {regions}" if regions else done)
         return {"FINISHED"}
 
 

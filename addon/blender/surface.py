@@ -11,6 +11,11 @@ from mathutils import Vector
 from ..app.maps import Surface
 from ..domain.effects.regions import FACE_REGIONS
 from ..domain.errors import InputError
+from ..domain.facs import ARKIT
+from ..domain.face_regions import find_regions
+from ..domain.head import load_regions
+from ..domain.head.model import ShapeKey
+from ..domain.resources import rigs_path
 
 GROUP_PREFIX = "sanguine_"
 REST_ATTRIBUTE = "rest_mm"
@@ -35,6 +40,32 @@ def face_regions(obj: bpy.types.Object) -> tuple[str, ...]:
     return tuple(region for region in FACE_REGIONS if GROUP_PREFIX + region in obj.vertex_groups)
 
 
+def find_face_regions(obj: bpy.types.Object) -> str:
+    """Gives a face without masks those that its shape keys tell. Returns what came of it, one line, "" if it has masks."""
+    if face_regions(obj):
+        return ""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    to_metres = _position_scale_mm(obj) / 1000.0
+    keys = {}
+    for key in mesh.shape_keys.key_blocks if mesh.shape_keys else ():
+        if key.name in ARKIT.keys:
+            moved = (_key_positions(key) - _key_positions(key.relative_key)) * to_metres
+            index = np.flatnonzero(moved.any(axis=1))
+            keys[key.name] = ShapeKey(index, moved[index])
+    found = find_regions(_position_mm(obj) / 1000.0, triangles.reshape(-1, 3), keys, load_regions(rigs_path("regions.toml")))
+    store_regions(obj, {region: mask for region, mask in found.regions.items() if region in FACE_REGIONS})
+    return found.because
+
+
+def _key_positions(key: bpy.types.ShapeKey) -> np.ndarray:
+    positions = np.empty(len(key.data) * 3, dtype=np.float32)
+    key.data.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
 def store_rest(obj: bpy.types.Object) -> None:
     """Writes the neutral positions, in mm, as a vertex attribute."""
     mesh = obj.data
@@ -46,9 +77,13 @@ def _position_mm(obj: bpy.types.Object) -> np.ndarray:
     """(V, 3) float32: the neutral face at the object's scale, in mm."""
     positions = np.empty(len(obj.data.vertices) * 3, dtype=np.float32)
     obj.data.vertices.foreach_get("co", positions)
+    return positions.reshape(-1, 3) * _position_scale_mm(obj)
+
+
+def _position_scale_mm(obj: bpy.types.Object) -> np.ndarray:
+    """(3,) float32: mm per unit of the mesh, along its axes."""
     mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
-    scale = np.array(obj.matrix_world.to_scale(), dtype=np.float32)
-    return positions.reshape(-1, 3) * (mm_per_unit * scale)
+    return np.array(obj.matrix_world.to_scale(), dtype=np.float32) * np.float32(mm_per_unit)
 
 
 def pixel_mm(scene: bpy.types.Scene, obj: bpy.types.Object) -> float | None:
