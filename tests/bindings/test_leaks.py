@@ -11,6 +11,11 @@ pixels = sanguine_core.rasterize_uv(
 view = pixels[2:, 2:]
 del pixels
 assert view.max() == 1
+with sanguine_core.MapWriter("a.exr", 4, 2, ["melanin"], {}) as writer:
+    writer.write_rows(numpy.zeros((2, 4, 1), numpy.float32))
+reader = sanguine_core.RowReader("a.exr")
+rows = reader.read_rows(0, 1)
+unfinished = sanguine_core.MapWriter("b.exr", 4, 2, ["melanin"], {})
 try:
     sanguine_core.read_image("absent.png")
 except sanguine_core.ImageError:
@@ -21,3 +26,4 @@ except sanguine_core.ImageError:
 def test_nothing_leaks(tmp_path):
     result = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, cwd=tmp_path)
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]

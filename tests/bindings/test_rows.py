@@ -3,6 +3,7 @@
 import resource
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -29,6 +30,16 @@ def test_rows_are_those_of_the_picture(picture):
         reader.read_rows(0, 1)
     with pytest.raises(ValueError, match="closed"):
         reader.width  # noqa: B018
+
+
+def test_threads_share_a_reader(picture):
+    def band(first):
+        return reader.read_rows(first, 1 + first % 7)
+
+    with sanguine_core.RowReader(picture) as reader, ThreadPoolExecutor(4) as pool:
+        firsts = [(7 * i) % 60 for i in range(200)]
+        for first, rows in zip(firsts, pool.map(band, firsts), strict=True):
+            np.testing.assert_array_equal(rows, PIXELS[first : first + 1 + first % 7])
 
 
 @pytest.mark.parametrize("rows", [(-1, 1), (70, 1), (0, 0), (0, 71), (0, -5), (69, 2)])

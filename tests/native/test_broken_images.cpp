@@ -234,6 +234,9 @@ TEST_F(BrokenImages, NothingAndSomethingElseAreRefused) {
     }
     expect_refused_by_all(folder_);
     expect_refused_by_all(folder_ / "absent.exr");
+    expect_refused_by_all(folder_ / "absent.null");  // OpenImageIO makes a picture up for these
+    expect_refused_by_all(file("a.null", "x"));
+    expect_refused_by_all("/dev/zero");
 }
 
 TEST_F(BrokenImages, AWrongMagicIsNoCrash) {
