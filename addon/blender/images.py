@@ -24,18 +24,34 @@ _TILE = "<UDIM>"
 
 
 def data_image(name: str, pixels: Pixels, half: bool = False) -> bpy.types.Image:
-    """A packed float image of numbers, not colours. half: kept as 16-bit floats, which round to 1 in 2000."""
-    if isinstance(pixels, Mapping) or half or pixels.shape[2] == 1:
-        return _from_files(name, pixels if isinstance(pixels, Mapping) else {FIRST_TILE: pixels}, half)
-    height, width, channels = pixels.shape
-    rgba = np.ones((height, width, 4), dtype=np.float32)
-    rgba[..., :channels] = pixels
-    image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=True, is_data=True)
-    # Numbers in alpha are numbers too: nothing may be multiplied by them.
-    image.alpha_mode = "CHANNEL_PACKED"
-    image.pixels.foreach_set(rgba.ravel())
-    image.update()
-    image.pack()
+    """A packed float image of numbers, not colours. half: kept as 16-bit floats, which round to 1 in 2000.
+
+    It goes by way of EXR files, which are gone afterwards: Blender packs a file as it is, compressed, where it would
+    pack what it was told pixel by pixel without; and it fills tiles other than the first from files alone.
+    """
+    tiles = pixels if isinstance(pixels, Mapping) else {FIRST_TILE: pixels}
+    tiled = list(tiles) != [FIRST_TILE]
+    with tempfile.TemporaryDirectory() as folder:
+        for tile, texels in tiles.items():
+            path = Path(folder) / (f"map.{tile}.exr" if tiled else "map.exr")
+            texels = np.ascontiguousarray(texels, dtype=np.float32)
+            sanguine_core.write_exr_map(path, texels, _CHANNELS[texels.shape[2]], {}, half=half)
+        image = bpy.data.images.load(str(path))
+        image.name = name
+        image.colorspace_settings.is_data = True
+        # Numbers in alpha are numbers too: nothing may be multiplied by them.
+        image.alpha_mode = "CHANNEL_PACKED"
+        if tiled:
+            image.source = "TILED"  # finds the other tiles
+            image.filepath_raw = str(Path(folder) / f"map.{_TILE}.exr")
+            image.reload()
+            if missing := set(tiles) - {tile.number for tile in image.tiles}:
+                raise RuntimeError(f"{name}: Blender did not find the tiles {sorted(missing)}")
+        image.pack()
+    # No folder of this machine in the file.
+    image.filepath_raw = f"//{name}.{_TILE}.exr" if tiled else f"//{name}.exr"
+    for packed in image.packed_files:
+        packed.filepath = f"//{name}.{packed.tile_number}.exr" if tiled else f"//{name}.exr"
     return image
 
 
@@ -61,31 +77,3 @@ def stored_range(image: bpy.types.Image) -> dict[str, Interval] | None:
     """What `store_range` kept, or None."""
     held = image.get(RANGE)
     return {name: (values[0], values[1]) for name, values in held.items()} if held is not None else None
-
-
-def _from_files(name: str, tiles: Mapping[int, np.ndarray], half: bool) -> bpy.types.Image:
-    """By way of EXR files, which are gone afterwards: Blender fills tiles other than the first from files alone, and
-    packs a file as it is."""
-    tiled = list(tiles) != [FIRST_TILE]
-    with tempfile.TemporaryDirectory() as folder:
-        for tile, pixels in tiles.items():
-            path = Path(folder) / (f"map.{tile}.exr" if tiled else "map.exr")
-            sanguine_core.write_exr_map(
-                path, np.ascontiguousarray(pixels, dtype=np.float32), _CHANNELS[pixels.shape[2]], {}, half=half
-            )
-        image = bpy.data.images.load(str(path))
-        image.name = name
-        image.colorspace_settings.is_data = True
-        image.alpha_mode = "CHANNEL_PACKED"
-        if tiled:
-            image.source = "TILED"  # finds the other tiles
-            image.filepath_raw = str(Path(folder) / f"map.{_TILE}.exr")
-            image.reload()
-            if missing := set(tiles) - {tile.number for tile in image.tiles}:
-                raise RuntimeError(f"{name}: Blender did not find the tiles {sorted(missing)}")
-        image.pack()
-    # No folder of this machine in the file.
-    image.filepath_raw = f"//{name}.{_TILE}.exr" if tiled else f"//{name}.exr"
-    for packed in image.packed_files:
-        packed.filepath = f"//{name}.{packed.tile_number}.exr" if tiled else f"//{name}.exr"
-    return image

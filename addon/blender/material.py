@@ -28,7 +28,7 @@ Map = Pixels | bpy.types.Image
 _OF_THE_FACE = (skin_map.MAP, residual.MAP)
 """Maps that come with the face and stay when the material goes."""
 
-# Maps that 16-bit floats hold: a rounding of 1 in 2000 does not show, and the file has a seventh of the size.
+# Maps that 16-bit floats hold: a rounding of 1 in 2000 does not show, and the file has half the size or less.
 _HALF = (*grown.MAPS, *_OF_THE_FACE)
 
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
