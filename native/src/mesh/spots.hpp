@@ -1,7 +1,6 @@
 // Round marks on the skin, found by place, that keep their mean where texels are too large to show them.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -12,7 +11,9 @@
 
 #include "noise.hpp"
 #include "place_grid.hpp"
+#include "random.hpp"
 #include "sanguine/feature.hpp"
+#include "scatter.hpp"
 
 namespace sanguine {
 
@@ -83,6 +84,42 @@ private:
     PlaceGrid grid_;
     std::vector<float> faded_mm2_;  // by 8 log2(size / smallest radius)
     float smallest_mm_ = 1;
+};
+
+/// Spots scattered over the skin at a density, and the mean of those too small to be seen.
+class ScatteredSpots {
+public:
+    struct Mark {
+        float radius_mm, strength;
+    };
+
+    ScatteredSpots() = default;
+    /// mark(random, place) says what grows at each of the points; see scatter() for the rest.
+    template <typename MarkOf>
+    ScatteredSpots(const SkinSurface& surface, std::vector<float> density_per_mm2, float spacing, float softness,
+                   std::uint64_t seed, const MarkOf& mark)
+        : surface_(&surface), density_(std::move(density_per_mm2)) {
+        std::vector<Spot> spots;
+        for (const Seedling& s : scatter(surface, density_, spacing, seed)) {
+            Random random(s.random);
+            const Mark m = mark(random, s);
+            spots.push_back({s.place_mm, s.normal, m.radius_mm, m.strength});
+        }
+        spots_ = Spots(std::move(spots), softness);
+    }
+
+    const Spots& spots() const { return spots_; }
+
+    /// Sum of the strengths at the place.
+    float operator()(const SkinPlace& place, glm::vec3 lookup_mm) const {
+        const float faded = spots_.faded_mm2(place.size_mm);
+        return spots_.sum(place, lookup_mm) + (faded > 0 ? faded * surface_->value_at(place.point, density_) : 0);
+    }
+
+private:
+    const SkinSurface* surface_ = nullptr;
+    std::vector<float> density_;
+    Spots spots_;
 };
 
 }  // namespace sanguine
