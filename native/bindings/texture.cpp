@@ -86,35 +86,50 @@ std::optional<sanguine::PixelType> pixel_type_named(const std::optional<std::str
     throw std::invalid_argument("pixel_type: '" + *name + "' is not one of uint8, uint16, half, float");
 }
 
-/// A RowReader that can be closed; the file is let go with the last reference otherwise.
+/// One thing at a time with a file, whichever threads ask, and none of them holds the GIL meanwhile.
+class OneAtATime {
+public:
+    template <typename Work> auto operator()(Work work) {
+        nb::gil_scoped_release release;
+        std::lock_guard lock(mutex_);
+        return work();
+    }
+
+private:
+    std::mutex mutex_;
+};
+
+/// A RowReader that can be closed.
 class PyRowReader {
 public:
     explicit PyRowReader(const fs::path& path) {
-        nb::gil_scoped_release release;
-        reader_.emplace(path);
+        alone_([&] { reader_.emplace(path); });
     }
-    const sanguine::RowReader& open() const {
+    template <typename Ask> auto ask(Ask ask) {
+        return alone_([&] { return ask(open()); });
+    }
+    PixelsOut read_rows(int first, int count) {
+        return to_numpy(alone_([&] {
+            sanguine::RowReader& reader = open();
+            if (count < 1 || count > reader.height())
+                throw std::invalid_argument("read_rows: 1 to " + std::to_string(reader.height()) +
+                                            " rows are allowed, not " + std::to_string(count));
+            sanguine::Image rows(reader.width(), count, int(reader.channels().size()));
+            reader.read_rows(first, count, {rows.pixels.get(), rows.size()});
+            return rows;
+        }));
+    }
+    void close() {
+        alone_([&] { reader_.reset(); });
+    }
+
+private:
+    sanguine::RowReader& open() {
         if (!reader_) throw std::invalid_argument("RowReader: the file is closed");
         return *reader_;
     }
-    PixelsOut read_rows(int first, int count) {
-        const auto channels = int(open().channels().size());
-        if (count < 1 || count > open().height())
-            throw std::invalid_argument("read_rows: 1 to " + std::to_string(open().height()) + " rows are allowed, not " +
-                                        std::to_string(count));
-        sanguine::Image rows(open().width(), count, channels);
-        {
-            nb::gil_scoped_release release;
-            std::lock_guard lock(mutex_);
-            reader_->read_rows(first, count, {rows.pixels.get(), rows.size()});
-        }
-        return to_numpy(std::move(rows));
-    }
-    void close() { reader_.reset(); }
-
-private:
+    OneAtATime alone_;
     std::optional<sanguine::RowReader> reader_;
-    std::mutex mutex_;
 };
 
 /// A MapWriter that ends with its `with` block: committed, or abandoned after an exception.
@@ -123,39 +138,44 @@ public:
     PyMapWriter(const fs::path& path, int width, int height, const std::vector<std::string>& channels,
                 const sanguine::ExrAttributes& attributes, bool half, bool from_top)
         : shape_{std::size_t(width), channels.size()} {
-        writer_.emplace(path, width, height, channels, attributes, half,
-                        from_top ? sanguine::RowOrder::from_top : sanguine::RowOrder::from_bottom);
+        const auto order = from_top ? sanguine::RowOrder::from_top : sanguine::RowOrder::from_bottom;
+        alone_([&] { writer_.emplace(path, width, height, channels, attributes, half, order); });
     }
-    sanguine::MapWriter& open() {
-        if (!writer_) throw std::invalid_argument("MapWriter: the file is committed or abandoned");
-        return *writer_;
+    int rows_left() {
+        return alone_([&] { return open().rows_left(); });
     }
     void write_rows(const PixelsIn& rows) {
         if (rows.shape(1) != shape_[0] || rows.shape(2) != shape_[1])
             throw std::invalid_argument("write_rows: rows of " + std::to_string(shape_[0]) + " x " +
                                         std::to_string(shape_[1]) + " values are wanted, not of " +
                                         std::to_string(rows.shape(1)) + " x " + std::to_string(rows.shape(2)));
-        sanguine::MapWriter& writer = open();
-        nb::gil_scoped_release release;
-        std::lock_guard lock(mutex_);
-        writer.write_rows({rows.data(), rows.size()});
+        alone_([&] { open().write_rows({rows.data(), rows.size()}); });
     }
     void commit() {
-        sanguine::MapWriter& writer = open();
-        {
-            nb::gil_scoped_release release;
-            std::lock_guard lock(mutex_);
-            writer.commit();
-        }
-        writer_.reset();
+        alone_([&] {
+            open().commit();
+            writer_.reset();
+        });
     }
-    void abandon() { writer_.reset(); }
-    bool is_open() const { return writer_.has_value(); }
+    void abandon() {
+        alone_([&] { writer_.reset(); });
+    }
+    void leave(bool whole) {
+        alone_([&] {
+            std::optional<sanguine::MapWriter> last = std::move(writer_);
+            writer_.reset();
+            if (last && whole) last->commit();
+        });
+    }
 
 private:
+    sanguine::MapWriter& open() {
+        if (!writer_) throw std::invalid_argument("MapWriter: the file is committed or abandoned");
+        return *writer_;
+    }
+    OneAtATime alone_;
     std::optional<sanguine::MapWriter> writer_;
     std::array<std::size_t, 2> shape_;  // width, channels
-    std::mutex mutex_;
 };
 
 void bind_rows(nb::module_& m) {
@@ -166,15 +186,18 @@ any order; from the top down is cheapest, since files are decoded from there, an
 read again (a halo costs nothing). Memory is that of the rows, rounded up to tiles, and what the format's decoder
 needs: interlaced PNG, progressive JPEG, GIF and WebP are whole pictures there. Raises ImageError.)")
         .def(nb::init<const fs::path&>(), "path"_a)
-        .def_prop_ro("width", [](const PyRowReader& r) { return r.open().width(); })
-        .def_prop_ro("height", [](const PyRowReader& r) { return r.open().height(); })
-        .def_prop_ro("channels", [](const PyRowReader& r) { return r.open().channels(); }, "Names, in the file's order.")
-        .def_prop_ro("pixel_type", [](const PyRowReader& r) { return r.open().pixel_type(); },
-                     "uint8, uint16, half, float or another of OpenImageIO's names.")
+        .def_prop_ro("width", [](PyRowReader& r) { return r.ask([](auto& file) { return file.width(); }); })
+        .def_prop_ro("height", [](PyRowReader& r) { return r.ask([](auto& file) { return file.height(); }); })
+        .def_prop_ro(
+            "channels", [](PyRowReader& r) { return r.ask([](auto& file) { return file.channels(); }); },
+            "Names, in the file's order.")
+        .def_prop_ro(
+            "pixel_type", [](PyRowReader& r) { return r.ask([](auto& file) { return file.pixel_type(); }); },
+            "uint8, uint16, half, float or another of OpenImageIO's names.")
         .def_prop_ro(
             "alpha_channel",
-            [](const PyRowReader& r) {
-                const int channel = r.open().alpha_channel();
+            [](PyRowReader& r) {
+                const int channel = r.ask([](auto& file) { return file.alpha_channel(); });
                 return channel < 0 ? std::optional<int>() : channel;
             },
             "Index of the channel that is alpha, or None.")
@@ -191,24 +214,15 @@ bottom up; either way row 0 of each band is its lowest. Raises ImageError; Value
         .def(nb::init<const fs::path&, int, int, const std::vector<std::string>&, const sanguine::ExrAttributes&, bool,
                       bool>(),
              "path"_a, "width"_a, "height"_a, "channels"_a, "attributes"_a, "half"_a = true, "from_top"_a = false)
-        .def_prop_ro("rows_left", [](PyMapWriter& w) { return w.open().rows_left(); })
+        .def_prop_ro("rows_left", &PyMapWriter::rows_left)
         .def("write_rows", &PyMapWriter::write_rows, "rows"_a, "The next rows: (N, W, C) float32, finite.")
         .def("commit", &PyMapWriter::commit, "Makes the file appear; rows must not be missing.")
         .def("abandon", &PyMapWriter::abandon, "Leaves nothing behind.")
         .def("__enter__", [](nb::handle self) { return nb::borrow(self); })
-        .def("__exit__", [](PyMapWriter& w, nb::handle type, nb::handle, nb::handle) {
-            if (!w.is_open()) return;
-            if (type.is_none()) {
-                try {
-                    w.commit();
-                } catch (...) {
-                    w.abandon();
-                    throw;
-                }
-            } else {
-                w.abandon();
-            }
-        }, "type"_a.none(), "value"_a.none(), "traceback"_a.none());
+        .def(
+            "__exit__",
+            [](PyMapWriter& w, nb::handle type, nb::handle, nb::handle) { w.leave(type.is_none()); },
+            "type"_a.none(), "value"_a.none(), "traceback"_a.none());
 }
 
 /// The wheel carries it beside the module.

@@ -1,17 +1,25 @@
 #include "open_image.hpp"
 
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #include "sanguine/image.hpp"
 
 namespace sanguine {
 
 std::unique_ptr<OIIO::ImageInput> open_checked(const std::filesystem::path& path) {
+    // Some of OpenImageIO's readers need no file: a name that ends in .null makes a picture up.
+    std::error_code error;
+    const auto kind = std::filesystem::status(path, error).type();
+    if (kind == std::filesystem::file_type::not_found) throw ImageError(path, "no such file");
+    if (kind != std::filesystem::file_type::regular) throw ImageError(path, "cannot be read: it is no ordinary file");
     OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1);
     auto input = OIIO::ImageInput::open(path.string(), &config);
     if (!input) throw ImageError(path, "cannot be read: " + OIIO::geterror());
     const OIIO::ImageSpec& spec = input->spec();
+    if (std::string_view(input->format_name()) == "null") throw ImageError(path, "is no picture");
     if (spec.deep) throw ImageError(path, "is a deep image; flat ones are allowed");
     if (spec.width < 1 || spec.height < 1 || spec.depth != 1 || spec.width > max_image_side ||
         spec.height > max_image_side || spec.nchannels < 1 || spec.nchannels > max_image_channels)
