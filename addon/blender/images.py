@@ -1,7 +1,8 @@
-"""Arrays as packed data images, so that a saved file needs nothing beside it."""
+"""Images as arrays: packed data images, so that a saved file needs nothing beside it, and pictures in linear light."""
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +12,9 @@ import numpy as np
 import sanguine_core
 
 from ..domain.effects.effect import Interval
+from ..domain.errors import InputError
 from ..domain.udim import FIRST_TILE
+from .osl import find_oslquery
 
 RANGE = "sanguine_range"
 """Custom property of an image: chromophore that it holds -> lowest and highest value over its texels."""
@@ -77,3 +80,49 @@ def stored_range(image: bpy.types.Image) -> dict[str, Interval] | None:
     """What `store_range` kept, or None."""
     held = image.get(RANGE)
     return {name: (values[0], values[1]) for name, values in held.items()} if held is not None else None
+
+
+def scene_linear(image: bpy.types.Image) -> np.ndarray:
+    """Pixels of a picture in the file's working space, linear: (H, W, 4) float32, row 0 lowest, alpha straight.
+
+    What is painted and not saved is in it. Raises InputError for a picture without pixels or in a colour space that
+    OpenColorIO cannot convert.
+    """
+    width, height = image.size
+    if not width * height or not image.channels:
+        raise InputError(f"{image.name}: no pixels: the picture is empty or its file is missing")
+    pixels = np.empty((height, width, image.channels), dtype=np.float32)
+    image.pixels.foreach_get(pixels.ravel())
+    rgba = np.ones((height, width, 4), dtype=np.float32)
+    if image.channels < 3:
+        rgba[..., :3] = pixels[..., :1]
+    else:
+        rgba[..., : image.channels] = pixels
+    # Blender keeps pictures of bytes in their own encoding, and those of floats in the working space.
+    if not image.is_float and not image.colorspace_settings.is_data:
+        _decode(image, rgba)
+    return rgba
+
+
+def _decode(image: bpy.types.Image, rgba: np.ndarray) -> None:
+    """From the picture's colour space to the working space, in place."""
+    find_oslquery()  # OpenColorIO lies beside it
+    try:
+        import PyOpenColorIO as ocio
+    except ImportError:
+        raise InputError(
+            f"{image.name}: this Blender has no OpenColorIO for Python: convert the picture to float (32 bit) first"
+        ) from None
+    name = image.colorspace_settings.name
+    data = getattr(bpy.data, "colorspace", None)  # since Blender 5.0 a file chooses its working space
+    try:
+        if os.environ.get("OCIO"):
+            config = ocio.Config.CreateFromEnv()
+        else:
+            config = ocio.Config.CreateFromFile(
+                str(Path(bpy.utils.resource_path("LOCAL")) / "datafiles" / "colormanagement" / "config.ocio")
+            )
+        target = data.working_space if data else ocio.ROLE_SCENE_LINEAR
+        config.getProcessor(name, target).getDefaultCPUProcessor().applyRGBA(rgba)
+    except ocio.Exception as error:
+        raise InputError(f"{image.name}: colour space '{name}': {' '.join(str(error).split())}") from None
