@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +14,108 @@ import sanguine_core
 
 from ..domain.effects import EFFECTS, Frame, Growth, Scene, anatomy
 from ..domain.errors import InputError
-from ..domain.parameters import PARAMETERS, Skin
-from ..domain.plan import Plan, make_plan
+from ..domain.head import load_presets
+from ..domain.parameters import PARAMETERS, Skin, default_skin
+from ..domain.people import person
+from ..domain.plan import Plan, check_strengths, make_plan
+from ..domain.resources import rigs_path
+from ..domain.shot import read_shot, scene_of
 from ..domain.texel_density import MapSizes
 from ..domain.udim import FIRST_TILE
 from ..domain.uv_checks import uv_warnings
+from .faces import example_head, head_surface
 from .map_cache import MapCache
 from .map_files import MapHeader, write_maps
 from .maps import GROWN, Progress, Surface, bake_maps
+from .skin_report import read_skins
 from .spectral import write_spectral
+
+SIZES = (16, 8192)
 
 CHROMOPHORES = ("melanin", "hemoglobin", "oxygenation", "oil")
 """Channels that every chromophore map has; those of `_BESIDE` come when something grows there."""
 
 _BESIDE = {"grown_ink": "ink_per_mm", "grown_height": "height_mm"}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What `sanguine maps` is asked for beside the face.
+
+    features: strengths that override those of the person. tone: None takes the default skin and no features.
+    skin_path: a SKIN.json whose first skin overrides the person's. spectral_nm: wavelengths of a spectral image of the
+    reflectance; None for no such image. cache: a folder, "none", or None for the default one.
+    """
+
+    features: Mapping[str, float] = field(default_factory=dict)
+    tone: str | None = None
+    sex: str = "female"
+    age_years: float = 30.0
+    sun: float = 0.5
+    seed: int = 0
+    skin_path: str | None = None
+    size: int = 2048
+    spectral_nm: np.ndarray | None = None
+    tx: bool = False
+    cache: str | None = None
+
+
+def feature_list() -> dict[str, Any]:
+    """Every feature with what it changes, as JSON."""
+    return {"sanguine": sanguine_core.__version__, "features": sanguine_core.features()}
+
+
+def grow_maps(
+    face: str,
+    read_mesh: Callable[[str], Surface],
+    out_dir: str | os.PathLike[str],
+    request: Request,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Grows the maps of a head of ours, of a mesh file or of the subjects of a shot, and writes them into `out_dir`.
+
+    Several subjects get a folder each. Returns the report; raises InputError, one line that names what is wrong.
+    """
+    if not SIZES[0] <= request.size <= SIZES[1]:
+        raise InputError(f"--size: {request.size} is outside {SIZES[0]} to {SIZES[1]}")
+    cache = MapCache() if request.cache is None else MapCache(None if request.cache == "none" else Path(request.cache))
+    if face.endswith(".toml"):
+        return _grow_shot(face, out_dir, request, cache, progress)
+    heads = load_presets(rigs_path("heads.toml"))
+    surface = head_surface(example_head(face)) if face in heads else read_mesh(face)
+    someone = person(request.tone or "intermediate", request.sex, request.age_years, request.seed, request.sun)
+    skin, strengths = (someone.skin, someone.strengths) if request.tone else (default_skin(), {})
+    if request.skin_path:
+        skin = read_skins(request.skin_path)[1][0]
+    strengths = check_strengths({**strengths, **_expand(request.features)}, "--features")
+    plan = maps_plan(skin, strengths, surface, someone.growth)
+    return write_chromophores(
+        plan, surface, out_dir, request.size, cache, progress, request.spectral_nm, request.tx
+    )
+
+
+def _grow_shot(
+    path: str, out_dir: str | os.PathLike[str], request: Request, cache: MapCache, progress: Progress | None
+) -> dict[str, Any]:
+    shot = read_shot(path)
+    reports = {}
+    for subject in shot.subjects:
+        surface = head_surface(example_head(subject.rig.head))
+        scene = scene_of(shot, subject, tuple(surface.regions))
+        strengths = dict(scene.strengths) | _expand(request.features)
+        plan = maps_plan(scene.skin, check_strengths(strengths, "--features"), surface, scene.growth)
+        folder = Path(out_dir) / subject.id if len(shot.subjects) > 1 else out_dir
+        reports[subject.id] = write_chromophores(
+            plan, surface, folder, request.size, cache, progress, request.spectral_nm, request.tx
+        )
+    first = next(iter(reports.values()))
+    return {**first, "subjects": reports} if len(reports) > 1 else first
+
+
+def _expand(features: Mapping[str, float]) -> dict[str, float]:
+    """`all` stands for every feature; what is named besides keeps its own strength."""
+    every = {row["id"]: features["all"] for row in sanguine_core.features()} if "all" in features else {}
+    return every | {name: value for name, value in features.items() if name != "all"}
 
 
 def maps_plan(skin: Skin, strengths: Mapping[str, float], surface: Surface, growth: Growth) -> Plan:

@@ -42,10 +42,13 @@ _READERS: dict[str, Callable[[str], object]] = {
 SUFFIXES = tuple(_READERS)
 
 
-def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Surface:
+METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+
+
+def read_mesh(path: str | os.PathLike[str], name: str | None = None, unit: str = "m") -> Surface:
     """The mesh of a file as maps need it: the object `name`, or the one with the most faces.
 
-    Lengths are taken as Blender's importer gives them, in metres. Empties the open scene. Raises InputError for a file
+    unit: of the lengths as Blender's importer gives them, a key of METRES. Empties the open scene. Raises InputError for a file
     that is missing, too large, not a mesh or without a UV map.
     """
     path = Path(path)
@@ -70,4 +73,5 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None) -> Surface:
         raise InputError(f"{path}: holds no mesh with faces")
     if name is not None and name not in meshes:
         raise InputError(f"{path}: no mesh '{name}', {nearest(name, meshes)}")
+    bpy.context.scene.unit_settings.scale_length = METRES[unit]
     return read_surface(meshes[name] if name else max(meshes.values(), key=lambda obj: len(obj.data.polygons)))

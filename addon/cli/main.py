@@ -85,6 +85,29 @@ def _parser() -> argparse.ArgumentParser:
                         help="standard deviation of the picture's noise in L*a*b* (default %(default)s)")
     invert.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    maps = _verb(verbs, "maps", _maps, "grow what is in the skin of a face, place by place, into chromophore maps")
+    maps.add_argument("face", metavar="FACE", help="a head of ours (female, male), a mesh file (.obj .ply .usd .glb .blend), "
+                      "or a SHOT.toml, which says the rest too")
+    maps.add_argument("--out-dir", required=True, metavar="DIR", help="folder for chromophores.exr")
+    maps.add_argument("--object", metavar="NAME", help="which mesh of the file (default: the one with the most faces)")
+    maps.add_argument("--unit", default="m", choices=("m", "dm", "cm", "mm", "in"),
+                      help="of lengths in the mesh file (default %(default)s)")
+    maps.add_argument("--features", default="", metavar="ID=X,…",
+                      help="strengths 0 to 1 of features; ID alone is 1, 'all' every one, 'list' prints them")
+    maps.add_argument("--tone", metavar="LABEL", help="monk-1 to monk-10, fitzpatrick-1 to -6, or ita:<degrees>: gives the skin "
+                      "and the features of such a person, which --features and --skin override")
+    maps.add_argument("--sex", default="female", choices=("female", "male"))
+    maps.add_argument("--age", type=float, default=30.0, metavar="YEARS")
+    maps.add_argument("--sun", type=float, default=0.5, metavar="X", help="exposure of a life, 0 to 1 (default %(default)s)")
+    maps.add_argument("--seed", type=int, default=0, metavar="N", help="which individual")
+    maps.add_argument("--skin", metavar="SKIN.json", help="its first skin instead of the tone's")
+    maps.add_argument("--size", type=int, default=2048, metavar="N", help="texels along a side (default %(default)s)")
+    maps.add_argument("--spectral", nargs="?", const="400:700:10", metavar="FIRST:LAST:STEP",
+                      help="write the reflectance as a spectral EXR too (default 400:700:10 nm)")
+    maps.add_argument("--tx", action="store_true", help="write tiled, mip-mapped copies too")
+    maps.add_argument("--cache", metavar="DIR", help="folder of what was computed before, 'none' for none")
+    maps.add_argument("--out", metavar="FILE", help="write the report there instead of to standard output")
+
     bench = _verb(verbs, "bench", _bench, "measure what accuracy costs in time; for a checkout of the sources")
     bench.add_argument("what", choices=["accuracy"], help="accuracy: every solver and setting of the optics")
     bench.add_argument("--quick", action="store_true", help="a few cases, seconds instead of minutes")
@@ -199,8 +222,59 @@ def _invert(options: argparse.Namespace) -> int:
                              noise=noise, progress=progress)
     for warning in report["warnings"]:
         print(f"sanguine: {warning}", file=sys.stderr)
+
+
+def _maps(options: argparse.Namespace) -> int:
+    from ..app.growing import Request, feature_list, grow_maps
+    from ..domain.files import check_file, check_folder
+    from .progress import reporter
+
+    if options.features == "list":
+        _answer(feature_list(), options.out)
+        return 0
+    check_file(options.out)
+    check_folder(options.out_dir)
+    spectral = _wavelengths(options.spectral) if options.spectral else None
+    request = Request(
+        features=_strengths(options.features), tone=options.tone, sex=options.sex, age_years=options.age, sun=options.sun,
+        seed=options.seed, skin_path=options.skin, size=options.size, spectral_nm=spectral, tx=options.tx,
+        cache=options.cache,
+    )
+    with reporter(options.json_progress) as progress:
+        report = grow_maps(options.face, _mesh_reader(options), options.out_dir, request,
+                           lambda done, total: progress("texels", done, total) or True)
+    for line in report["warnings"]:
+        print(f"sanguine: {options.face}: {line}", file=sys.stderr)
     _answer(report, options.out)
     return 0
+
+
+
+
+def _mesh_reader(options: argparse.Namespace) -> Any:
+    """Reads a mesh file through Blender, which is loaded only when there is one to read."""
+
+    def read(path: str) -> Any:
+        try:
+            from ..blender.meshes import read_mesh
+        except ModuleNotFoundError as error:
+            if error.name not in ("bpy", "_bpy"):
+                raise
+            raise InputError(f"{path}: mesh files need Blender: run this inside it, or `pip install bpy==4.5.15`") from None
+        return read_mesh(path, options.object, options.unit)
+
+    return read
+
+
+def _strengths(text: str) -> dict[str, float]:
+    strengths = {}
+    for part in filter(None, text.split(",")):
+        name, _, value = part.partition("=")
+        try:
+            strengths[name] = float(value) if value else 1.0
+        except ValueError:
+            raise InputError(f"--features: {part!r} is not ID=NUMBER") from None
+    return strengths
 
 
 def _bench(options: argparse.Namespace) -> int:
