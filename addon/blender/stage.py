@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Vector
 
-SENSOR_MM = 36.0
+from ..domain.framing import SENSOR_MM, portrait
+
 BACKDROP_M = 1.3  # behind the head
 
 
@@ -70,10 +71,8 @@ def set_stage(
     turn_deg  : the camera walks round the head, + toward the subject's left
     ambient   : radiance of the world, backdrop: its albedo
     """
-    eyes_, chin_, crown_ = Vector(eyes), Vector(chin), Vector(crown)
-    head_height = crown_.z - chin_.z
-    middle = Vector((0, (eyes_.y + crown_.y) / 2, chin_.z + head_height * 0.42))
-    frame_height = head_height * 1.6
+    framing = portrait(eyes, chin, crown, lens_mm, turn_deg)
+    middle, toward, eyes_ = Vector(framing.middle), Vector(framing.toward), Vector(eyes)
 
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
@@ -87,10 +86,8 @@ def set_stage(
 
     camera = bpy.data.objects.new("portrait_camera", bpy.data.cameras.new("portrait_camera"))
     camera.data.sensor_fit, camera.data.sensor_height, camera.data.lens = "VERTICAL", SENSOR_MM, lens_mm
-    distance = frame_height * lens_mm / SENSOR_MM
     turn = math.radians(turn_deg)
-    toward = Vector((math.sin(turn), -math.cos(turn), 0))
-    camera.location = middle + toward * distance
+    camera.location = middle + toward * framing.distance_m
     camera.rotation_euler = (math.pi / 2, 0, turn)
     scene.collection.objects.link(camera)
     scene.camera = camera
