@@ -1,0 +1,82 @@
+"""Pictures of what grows on skin: each feature alone, people of several tones, and the maps behind them.
+
+    python bench/feature_pictures.py [--out docs] [--only freckles,people] [--samples 64]
+
+Writes maps_features.jpg and maps_people.jpg, contact sheets of rendered heads (docs/maps.md shows them).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import sanguine_core
+from sanguine.blender.render import BlenderRenderer
+from sanguine.domain.plan import make_plan
+from sanguine.domain.shot import Shot, jobs, scene_of
+
+WIDTH, HEIGHT, YAW = 360, 440, 24.0
+BASE = {"epidermis_thickness_mm": 0.05, "melanin": 0.016, "hemoglobin": 0.012, "oxygenation": 0.8, "oil": 0.6, "roughness": 0.3}
+# What one feature is shown on: even, bare skin, with the relief that any skin has.
+PLAIN = {"anatomy": 1.0, "relief": 1.0}
+PEOPLE = [
+    ("female", {"tone": "monk-2", "sex": "female", "age": 22, "seed": 3, "sun": 0.6}),
+    ("male", {"tone": "monk-4", "sex": "male", "age": 48, "seed": 5, "sun": 0.7}),
+    ("female", {"tone": "monk-5", "sex": "female", "age": 34, "seed": 1}),
+    ("female", {"tone": "monk-7", "sex": "female", "age": 29, "seed": 2}),
+    ("male", {"tone": "monk-9", "sex": "male", "age": 40, "seed": 4}),
+]
+
+
+def shot_of(head: str, samples: int, **tables: object) -> Shot:
+    image = {"width": WIDTH, "height": HEIGHT, "samples": samples}
+    return Shot.model_validate(
+        {"rig": {"head": head}, "expression": [{"id": "rest"}], "image": image, "camera": {"yaw_degrees": YAW}, **tables}
+    )
+
+
+def render(renderer: BlenderRenderer, shot: Shot, png: Path) -> Path:
+    (subject,) = shot.subjects
+    scene = scene_of(shot, subject, renderer.regions(subject))
+    renderer.prepare(shot, subject, make_plan(scene, shot.chosen_quality.settings))
+    (job,) = jobs(shot)
+    renderer.render(shot.expression[0], 1, png, png.with_suffix(".exr"))
+    print(png.stem, file=sys.stderr, flush=True)
+    return png
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--only", default="", help="ids of features, 'none', 'all' and 'people'")
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--keep", type=Path, help="folder for the single pictures")
+    options = parser.parse_args()
+    wanted = set(filter(None, options.only.split(",")))
+    renderer = BlenderRenderer()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = options.keep or Path(scratch)
+        folder.mkdir(parents=True, exist_ok=True)
+        every = [row["id"] for row in sanguine_core.features()]
+        sets = {"none": {}, **{name: {name: 1.0} for name in every}, "all": dict.fromkeys(every, 0.6)}
+        made = []
+        for name, features in sets.items():
+            if wanted and name not in wanted:
+                continue
+            head = "male" if name == "beard" else "female"
+            shot = shot_of(head, options.samples, skin=BASE, effects={**PLAIN, **features})
+            made.append(render(renderer, shot, folder / f"{name}.png"))
+        if made:
+            sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_features.jpg", columns=6)
+        if not wanted or "people" in wanted:
+            made = []
+            for head, person in PEOPLE:
+                shot = shot_of(head, options.samples, person=person, effects={"relief": 1.0})
+                made.append(render(renderer, shot, folder / f"{person['tone']}, {person['sex']}, {person['age']}.png"))
+            sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_people.jpg", columns=5)
+
+
+if __name__ == "__main__":
+    main()
