@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import sanguine_core
 
-from ..domain.effects import EFFECTS, Frame, Growth, Scene, anatomy
+from ..domain.effects import EFFECTS, Frame, Growth, Scene, anatomy, grown
 from ..domain.errors import InputError
 from ..domain.head import load_presets
 from ..domain.parameters import PARAMETERS, Skin, default_skin
@@ -26,7 +26,7 @@ from ..domain.uv_checks import uv_warnings
 from .faces import example_head, head_surface
 from .map_cache import MapCache
 from .map_files import MapHeader, write_maps
-from .maps import GROWN, Progress, Surface, bake_maps
+from .maps import Progress, Surface, bake_maps
 from .skin_report import read_skins
 from .spectral import write_spectral
 
@@ -152,7 +152,7 @@ def _columns(plan: Plan, maps: Mapping[str, np.ndarray]) -> list[np.ndarray]:
             value[name] = value[name] * (1.0 + strength * (factors[..., i] - 1.0))
         value["oxygenation"] = value["oxygenation"] + strength * factors[..., 3]
     if "grown" in maps:
-        for channel, change in zip(GROWN["grown"], np.moveaxis(maps["grown"], 2, 0), strict=True):
+        for channel, change in zip(grown.MAPS["grown"], np.moveaxis(maps["grown"], 2, 0), strict=True):
             name = channel.removeprefix("log_")
             value[name] = value[name] * np.exp(change) if name != channel else value[name] + change
     return [np.clip(value[n], PARAMETERS[n].hard_min, PARAMETERS[n].hard_max) for n in CHROMOPHORES]

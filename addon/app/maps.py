@@ -14,8 +14,7 @@ import numpy as np
 import sanguine_core
 
 from ..domain.blood import ANATOMY, Rest
-from ..domain.effects import Growth, anatomy
-from ..domain.effects.grown import MAPS as GROWN
+from ..domain.effects import Growth, anatomy, grown
 from ..domain.effects.regions import region_images
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes
@@ -144,9 +143,9 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
     if name == anatomy.MAP:
         rest = {region: asdict(ANATOMY[region]) for region in face.regions if region in ANATOMY}
         return cache.get(key_of(face.digest, name, size, _PADDING, rest), lambda: _anatomy(face, size))
-    if name in GROWN:
+    if name in grown.MAPS:
         strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
-        return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, GROWN[name]))
+        return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
     return None
 
 

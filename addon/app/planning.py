@@ -3,21 +3,44 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, Protocol
 
 import sanguine_core
 
-from ..domain.effects import EFFECTS
+from ..domain.effects import EFFECTS, grown
+from ..domain.framing import Framing, portrait
 from ..domain.lut import entry_skins
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice
-from ..domain.shot import Shot, scene_of
+from ..domain.shot import Shot, Subject, scene_of
+from ..domain.texel_density import map_sizes, mm_per_uv
+from .faces import example_head, head_surface
+from .maps import Surface
 from .skin_maps import read_face_maps
 
 _TIMED_ENTRIES = 4
 
 
-def plan_report(shot: Shot, regions: tuple[str, ...], quality: Choice | None = None) -> dict[str, Any]:
+class FaceOf(Protocol):
+    """What the maps of a subject depend on, without building its scene."""
+
+    def __call__(self, subject: Subject) -> tuple[Surface, Framing]: ...
+
+
+def example_face(shot: Shot) -> FaceOf:
+    """The subjects of a shot are heads of ours, framed as a portrait."""
+
+    def face_of(subject: Subject) -> tuple[Surface, Framing]:
+        head = example_head(subject.rig.head)
+        eyes, chin, crown = (head.landmarks[name] for name in ("eyes", "chin", "crown"))
+        return head_surface(head), portrait(eyes, chin, crown, shot.camera.focal_mm, shot.camera.yaw_degrees)
+
+    return face_of
+
+
+def plan_report(
+    shot: Shot, regions: tuple[str, ...], quality: Choice | None = None, face_of: FaceOf | None = None
+) -> dict[str, Any]:
     """The answer of `sanguine plan`: one plan per subject, the first one's at the top level too.
 
     `costs_ms` is what an effect adds to the preparation of this shot on this machine: the table entries that
@@ -30,10 +53,33 @@ def plan_report(shot: Shot, regions: tuple[str, ...], quality: Choice | None = N
     }
     entry_ms = _entry_ms(next(iter(plans.values())))
     reports = {name: _report(plan, entry_ms) for name, plan in plans.items()}
+    for subject in shot.subjects if face_of else ():
+        reports[subject.id]["maps"] = _maps(plans[subject.id], shot, *face_of(subject))
     answer = {"sanguine": sanguine_core.__version__, "quality": _quality(shot, quality), **next(iter(reports.values()))}
     if len(reports) > 1:
         answer["subjects"] = reports
     return answer
+
+
+def _maps(plan: Plan, shot: Shot, surface: Surface, framing: Framing) -> list[dict[str, Any]]:
+    """Size and memory of each map that the face itself gives, and why."""
+    pixel_mm = framing.pixel_mm(surface.position_mm, shot.image.height)
+    span_mm = mm_per_uv(surface.position_mm, surface.uv, surface.triangles, surface.corner_vertex)
+    sizes = map_sizes(span_mm, pixel_mm, plan.settings)
+    seen = f"a pixel covers {pixel_mm:.2g} mm" if pixel_mm else "the camera is inside the face"
+    rows = []
+    for name in [name for name in plan.maps if name not in plan.scene.maps]:
+        detail = name in grown.MAPS
+        size = sizes.detail if detail else sizes.smooth
+        rows.append({
+            "id": name,
+            "size": size,
+            "texel_mm": round(span_mm / size, 3),
+            "tiles": list(surface.tiles),
+            "megabytes": round(len(surface.tiles) * size * size * 16 / 1e6, 1),  # four floats, as Blender holds them
+            "because": f"{seen}, a tile {span_mm:.0f} mm" + ("" if detail else f"; at most {plan.settings.map_size} by quality"),
+        })
+    return rows
 
 
 def _quality(shot: Shot, quality: Choice) -> dict[str, Any]:

@@ -294,13 +294,14 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    from ..app.planning import plan_report
+    from ..app.planning import example_face, plan_report
     from ..domain.effects.regions import FACE_REGIONS
     from ..domain.quality import choice
     from ..domain.shot import read_shot
 
     quality = choice(options.quality, options.delta_e)
-    _answer(plan_report(read_shot(options.shot), FACE_REGIONS, quality), options.out)
+    shot = read_shot(options.shot)
+    _answer(plan_report(shot, FACE_REGIONS, quality, example_face(shot)), options.out)
     return 0
 
 
