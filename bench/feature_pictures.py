@@ -12,12 +12,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+import bpy
 import sanguine_core
 from sanguine.blender.render import BlenderRenderer
 from sanguine.domain.plan import make_plan
-from sanguine.domain.shot import Shot, jobs, scene_of
+from sanguine.domain.shot import Shot, scene_of
 
-WIDTH, HEIGHT, YAW = 360, 440, 24.0
+WIDTH, HEIGHT, YAW = 640, 800, -22.0
+# Of the picture, from the left and from below: the face, where skin is to be judged.
+FACE = (0.18, 0.72, 0.27, 0.84)
 BASE = {"epidermis_thickness_mm": 0.05, "melanin": 0.016, "hemoglobin": 0.012, "oxygenation": 0.8, "oil": 0.6, "roughness": 0.3}
 # What one feature is shown on: even, bare skin, with the relief that any skin has.
 PLAIN = {"anatomy": 1.0, "relief": 1.0}
@@ -41,7 +44,9 @@ def render(renderer: BlenderRenderer, shot: Shot, png: Path) -> Path:
     (subject,) = shot.subjects
     scene = scene_of(shot, subject, renderer.regions(subject))
     renderer.prepare(shot, subject, make_plan(scene, shot.chosen_quality.settings))
-    (job,) = jobs(shot)
+    border = bpy.context.scene.render
+    border.use_border = border.use_crop_to_border = True
+    border.border_min_x, border.border_max_x, border.border_min_y, border.border_max_y = FACE
     renderer.render(shot.expression[0], 1, png, png.with_suffix(".exr"))
     print(png.stem, file=sys.stderr, flush=True)
     return png

@@ -182,7 +182,7 @@ def write_chromophores(
     path = Path(out_dir) / ("chromophores.<UDIM>.exr" if several else "chromophores.exr")
     strengths = {e.id: plan.scene.strengths[e.id] for e in plan.active if e.id in plan.scene.strengths}
     header = MapHeader(
-        mesh_hash=surface.digest, seed=plan.scene.growth.seed, features=strengths, skin=dict(plan.scene.skin)
+        mesh=surface.digest, seed=plan.scene.growth.seed, features=strengths
     )
     files = write_maps(path, tiles, channels, header)
     if spectral_nm is not None:
