@@ -43,7 +43,7 @@ def shot_of(head: str, samples: int, **tables: object) -> Shot:
 def render(renderer: BlenderRenderer, shot: Shot, png: Path) -> Path:
     (subject,) = shot.subjects
     scene = scene_of(shot, subject, renderer.regions(subject))
-    renderer.prepare(shot, subject, make_plan(scene, shot.chosen_quality.settings))
+    renderer.prepare(shot, subject, make_plan(scene, shot.chosen_quality.settings), {})
     border = bpy.context.scene.render
     border.use_border = border.use_crop_to_border = True
     border.border_min_x, border.border_max_x, border.border_min_y, border.border_max_y = FACE
