@@ -32,9 +32,9 @@ CHANNELS: dict[str, str] = {p.channel: p.unit for p in PARAMETERS.values() if p.
     "log_oil": "1",
     "oxygenation_change": "1",
     "height_mm": "mm",
-    "residual.R": "1",  # factor on the light that left the skin
-    "residual.G": "1",
-    "residual.B": "1",
+    "R": "1",  # factor on the light that left the skin
+    "G": "1",
+    "B": "1",
     "delta_e_2000": "1",
     "mask": "1",
 }

@@ -17,6 +17,7 @@ from ..domain.errors import InputError, nearest
 from ..domain.parameters import PARAMETERS
 from ..domain.shot import Maps
 from ..domain.udim import find_tiles
+from .map_files import CHANNELS
 
 Tiles = dict[int, np.ndarray]
 """UDIM tile -> (H, W, 3 or 4) float32, row 0 lowest; {1001: …} for an ordinary picture."""
@@ -61,7 +62,7 @@ def _skin_tile(path: Path, digest: Any) -> tuple[np.ndarray, dict[str, Interval]
     """One tile in the order of the map's channels, 0 where the file has none, and the range of those that it has."""
     pixels, names = _read(path, digest)
     for name in names:
-        if name not in PARAMETERS:
+        if name not in CHANNELS:
             raise InputError(f"{path}: channel {name}: {nearest(name, skin_map.CHANNELS)}")
     held = [name for name in skin_map.CHANNELS if name in names]
     if not held:

@@ -234,7 +234,7 @@ def _maps(options: argparse.Namespace) -> int:
         return 0
     check_file(options.out)
     check_folder(options.out_dir)
-    spectral = _wavelengths(options.spectral) if options.spectral else None
+    spectral = _wavelengths(options.spectral, "--spectral") if options.spectral else None
     request = Request(
         features=_strengths(options.features), tone=options.tone, sex=options.sex, age_years=options.age, sun=options.sun,
         seed=options.seed, skin_path=options.skin, size=options.size, spectral_nm=spectral, tx=options.tx,
@@ -369,7 +369,7 @@ def _radii(text: str) -> list[float]:
     return radii
 
 
-def _wavelengths(text: str) -> Any:
+def _wavelengths(text: str, flag: str = "--wavelengths") -> Any:
     import numpy as np
 
     try:
@@ -382,9 +382,9 @@ def _wavelengths(text: str) -> Any:
         else:
             values = np.array([float(part) for part in text.split(",")])
     except ValueError:
-        raise InputError(f"--wavelengths: {text!r} is not FIRST:LAST:STEP or a list like 450,550,650 (nm)") from None
+        raise InputError(f"{flag}: {text!r} is not FIRST:LAST:STEP or a list like 450,550,650 (nm)") from None
     if not np.all((values >= 380.0) & (values <= 780.0)):
-        raise InputError(f"--wavelengths: {text!r} leaves 380 to 780 nm")
+        raise InputError(f"{flag}: {text!r} leaves 380 to 780 nm")
     return values
 
 
