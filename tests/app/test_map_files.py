@@ -142,8 +142,8 @@ def test_wrong_channels_and_values_are_one_line(tmp_path):
     assert "channel 'red' is none of Sanguine's" in one_line(path, channels=["red"])
     assert "was made for another mesh" in one_line(path, mesh="ffff")
     assert read_maps(path, mesh="0a1b").header == HEADER
-    write_raw(path, good_attributes(), ("B", "G", "R"))
-    assert "channel 'B' is none of Sanguine's" in one_line(path)
+    write_raw(path, good_attributes(), ("X", "Y", "Z"))
+    assert "channel 'X' is none of Sanguine's" in one_line(path)
     write_raw(path, good_attributes(), NAMES, PIXELS + 1)
     assert "channel 'hemoglobin' holds 1" in one_line(path) and "0 to 0.25 are allowed" in one_line(path)
     for bad in (np.nan, np.inf, -np.inf):

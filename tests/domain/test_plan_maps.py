@@ -80,12 +80,12 @@ def test_features_share_maps_and_fragments(monkeypatch):
 
 @pytest.mark.parametrize("live", [False, True])
 def test_ink_is_an_axis_only_where_a_tattoo_is(monkeypatch, live):
-    declare(monkeypatch, "tattoo", ink_per_mm=(0.0, 6.0))
+    declare(monkeypatch, "emblem", ink_per_mm=(0.0, 6.0))
     frames = ({}, {"anger": 1.0})
     off = make_plan(scene(frames, live=live, ink_per_mm=0.5))
     assert "ink_per_mm" not in axes(off) and off.skin["ink_per_mm"] == 0.5
     assert "ink" not in "".join(sources(off).values())
-    plan = make_plan(scene(frames, {"tattoo": 0.5}, live=live, ink_per_mm=0.5))
+    plan = make_plan(scene(frames, {"emblem": 0.5}, live=live, ink_per_mm=0.5))
     assert [axis.id for axis in plan.axes] == ["hemoglobin", "melanin", "oxygenation", "ink_per_mm"]
     ink = axes(plan)["ink_per_mm"]
     if live:
@@ -100,7 +100,7 @@ def test_ink_is_an_axis_only_where_a_tattoo_is(monkeypatch, live):
 def test_a_declared_feature_that_is_off_changes_nothing(monkeypatch):
     frames = ({}, {"anger": 1.0})
     plain = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
-    declare(monkeypatch, "tattoo", ink_per_mm=(0.0, 6.0), height_mm=(0.0, 0.1), log_oil=(0.0, 1.0))
+    declare(monkeypatch, "emblem", ink_per_mm=(0.0, 6.0), height_mm=(0.0, 0.1), log_oil=(0.0, 1.0))
     plan = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
     assert sources(plan) == sources(plain) and plan.axes == plain.axes and plan.maps == plain.maps
     assert not {"grown", "skin_map", "residual"} & set(plan.maps)
