@@ -13,7 +13,7 @@ from sanguine.domain import people
 from sanguine.domain.effects import Effect, Growth
 from sanguine.domain.errors import InputError
 from sanguine.domain.parameters import PARAMETERS
-from sanguine.domain.people import CLASSES, MEASURED, TONES, face_lab, person, traits_of
+from sanguine.domain.people import CLASSES, MEASURED, TONES, TRAITS, face_lab, person, traits_of
 
 CLASS_NAMES = list(CLASSES)  # from the lightest to the darkest
 MONK = [f"monk-{k}" for k in range(1, 11)]
@@ -138,6 +138,11 @@ def test_features_of_this_build_are_switched_on(monkeypatch):
     for p in several:
         traits = traits_of(p.ita, p.growth)
         assert p.strengths == {name: traits[name] for name in known if traits[name] > 0}
+
+
+def test_every_feature_has_a_row_and_no_row_is_of_nothing():
+    """A new feature needs a [[trait]] in rigs/people.toml: who has it? strength = 0.0 if a preset never gives it."""
+    assert {row["id"] for row in sanguine_core.features()} == set(TRAITS) - set(PARAMETERS)
 
 
 def test_what_this_build_does_not_have_is_passed_over():
