@@ -7,6 +7,7 @@ import bpy
 from ..domain.effects import Frame, Scene
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
+from .albedo import read_picture
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .properties import map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
@@ -42,6 +43,16 @@ def live_plan(face: bpy.types.Object) -> Plan:
     )
 
 
+def _may_change(cls: type[bpy.types.Operator], face: bpy.types.Object | None) -> bool:
+    if face is None:
+        cls.poll_message_set("Select a face: a mesh object")
+    elif face.library or face.data.library:
+        cls.poll_message_set("The face is linked: make it local, or override its library, first")
+    else:
+        return True
+    return False
+
+
 class SANGUINE_OT_apply_skin(bpy.types.Operator):
     bl_idname = "sanguine.apply_skin"
     bl_label = "Apply Skin"
@@ -50,17 +61,10 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        face = active_face(context)
-        if face is None:
-            cls.poll_message_set("Select a face: a mesh object")
-            return False
-        if face.library or face.data.library:
-            cls.poll_message_set("The face is linked: make it local, or override its library, first")
-            return False
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave to object mode first")
             return False
-        return True
+        return _may_change(cls, active_face(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
@@ -82,6 +86,79 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def albedo_of(face: bpy.types.Object) -> bpy.types.Image | None:
+    """The picture that colours the skin of a face: what leads to Base Color, else the only one in its material."""
+    if not face.material_slots or (material := face.material_slots[skin_slot(face)].material) is None:
+        return None
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    if shader is not None and (image := _image_behind(shader.inputs["Base Color"])) is not None:
+        return image
+    images = {node.image for node in nodes if node.type == "TEX_IMAGE" and node.image and not node.image.colorspace_settings.is_data}
+    return images.pop() if len(images) == 1 else None
+
+
+def _image_behind(socket: bpy.types.NodeSocket, depth: int = 8) -> bpy.types.Image | None:
+    for link in socket.links if depth else ():
+        if link.from_node.type == "TEX_IMAGE" and link.from_node.image:
+            return link.from_node.image
+        for behind in link.from_node.inputs:
+            if (image := _image_behind(behind, depth - 1)) is not None:
+                return image
+    return None
+
+
+class SANGUINE_OT_read_picture(bpy.types.Operator):
+    bl_idname = "sanguine.read_picture"
+    bl_label = "Read Picture"
+    bl_description = (
+        "Read melanin, hemoglobin and oxygenation from a colour map of the active face, painted or photographed, saved or "
+        "not. What is no skin in it (brows, make-up, shade) is kept as it looks"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    image: bpy.props.StringProperty(
+        name="Picture", description="The colour map; left empty, the one of the face's material"
+    )
+    shading: bpy.props.EnumProperty(
+        name="Light in it",
+        description="Light that is baked into the picture",
+        items=[
+            ("auto", "Find Out", "Split off as much as pigment cannot explain"),
+            ("off", "None", "The picture is an albedo: all that is dark in it is pigment or blood"),
+            ("on", "Split Off", "The picture is a photograph: all slow changes of lightness are light"),
+        ],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _may_change(cls, active_face(context))
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if not self.image and (image := albedo_of(active_face(context))) is not None:
+            self.image = image.name
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop_search(self, "image", bpy.data, "images")
+        self.layout.prop(self, "shading")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        face = active_face(context)
+        image = bpy.data.images.get(self.image) if self.image else albedo_of(face)
+        if image is None:
+            self.report({"ERROR"}, f"no picture '{self.image}'" if self.image else "the face's material has no picture: name one")
+            return {"CANCELLED"}
+        try:
+            report = read_picture(face, image, self.shading)
+        except (ValueError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{image.name}: {report}. Apply the skin to see it")
+        return {"FINISHED"}
+
+
 def _new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Object:
     """An armature for the controls of a face that has none; it does not deform anything."""
     rig = bpy.data.objects.new(f"{face.name} controls", bpy.data.armatures.new(f"{face.name} controls"))
@@ -100,4 +177,4 @@ def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
     return rig.pose.bones.get(CONTROL_BONE) if rig is not None and rig.pose is not None else None
 
 
-CLASSES = (SANGUINE_OT_apply_skin,)
+CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture)
