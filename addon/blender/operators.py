@@ -9,7 +9,7 @@ from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
-from .properties import map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
+from .properties import growth_of, map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions, find_face_regions
 
@@ -38,6 +38,7 @@ def live_plan(face: bpy.types.Object) -> Plan:
             regions=face_regions(face),
             live=True,
             maps=map_ranges_of(face),
+            growth=growth_of(face),
         ),
         quality_of(face),
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..domain.blood import BLOOD_CONTROL
-from ..domain.effects import EFFECTS, residual, skin_map
+from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
-from .operators import SANGUINE_OT_apply_skin, active_face, emotion_bone, live_plan
+from .operators import SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, active_face, emotion_bone, live_plan
 from .properties import strength_property
 
 
@@ -57,10 +57,35 @@ class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
         for row in PARAMETERS.values():
             layout.prop(settings, row.id)
         for effect in EFFECTS:
-            if effect.default_strength is not None:
+            if effect.default_strength is not None and effect not in grown.EFFECTS:
                 layout.prop(settings, strength_property(effect.id), slider=True)
+
+
+class SANGUINE_PT_picture(_FacePanel, bpy.types.Panel):
+    bl_label = "From a Picture"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator(SANGUINE_OT_read_picture.bl_idname, icon="IMAGE_DATA")
         for name in (skin_map.MAP, residual.MAP):
-            layout.prop(settings, name)
+            layout.prop(active_face(context).sanguine, name)
+
+
+class SANGUINE_PT_features(_FacePanel, bpy.types.Panel):
+    bl_label = "Features"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        settings = active_face(context).sanguine
+        column = layout.column(align=True)
+        for name in Growth.__dataclass_fields__:
+            column.prop(settings, name)
+        column = layout.column(align=True)
+        for effect in grown.EFFECTS:
+            column.prop(settings, strength_property(effect.id), slider=True)
 
 
 class SANGUINE_PT_plan(_FacePanel, bpy.types.Panel):
@@ -76,4 +101,4 @@ class SANGUINE_PT_plan(_FacePanel, bpy.types.Panel):
         self.layout.label(text=f"{plan.entries} skins in the table")
 
 
-CLASSES = (SANGUINE_PT_main, SANGUINE_PT_skin, SANGUINE_PT_plan)
+CLASSES = (SANGUINE_PT_main, SANGUINE_PT_skin, SANGUINE_PT_features, SANGUINE_PT_picture, SANGUINE_PT_plan)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..domain.effects import EFFECTS, residual, skin_map
+from ..domain.effects import EFFECTS, Growth, residual, skin_map
 from ..domain.effects.effect import Interval
 from ..domain.parameters import PARAMETERS
+from ..domain.people import AGES, SEEDS
 from ..domain.quality import DEFAULT, PRESETS, Settings, preset
 from .images import measure_range, stored_range
 
@@ -33,6 +34,7 @@ def _skin_properties() -> dict[str, object]:
                 name=effect.label, description=effect.help, default=effect.default_strength, min=0.0, max=1.0,
                 override={"LIBRARY_OVERRIDABLE"},
             )
+    made |= _growth_properties()
     channels = "red {}, green {}, blue {}, alpha {}".format(*skin_map.CHANNELS)
     for effect, more in ((skin_map.EFFECT, f" {channels.capitalize()}"), (residual.EFFECT, "")):
         made[effect.id] = bpy.props.PointerProperty(
@@ -47,6 +49,33 @@ def _skin_properties() -> dict[str, object]:
         override={"LIBRARY_OVERRIDABLE"},
     )
     return made
+
+
+def _growth_properties() -> dict[str, object]:
+    """Who grows the features: the fields of `Growth`."""
+    common = {"override": {"LIBRARY_OVERRIDABLE"}}
+    default = Growth()
+    return {
+        "seed": bpy.props.IntProperty(
+            name="Individual", description="Number of the individual: where freckles, moles and vessels lie",
+            default=default.seed, min=SEEDS[0], max=SEEDS[1], **common,
+        ),
+        "age_years": bpy.props.FloatProperty(
+            name="Age", description="Years: spots and small vessels grow with them", default=default.age_years, min=AGES[0],
+            max=AGES[1], soft_min=15.0, soft_max=90.0, precision=0, step=100, **common,
+        ),
+        "sun": bpy.props.FloatProperty(
+            name="Sun", description="Exposure of a life: 0 none, 1 a life outdoors", default=default.sun, min=0.0, max=1.0, **common
+        ),
+        "masculinity": bpy.props.FloatProperty(
+            name="Masculinity", description="0 female, 1 male: hair of the beard, thickness of vessels",
+            default=default.masculinity, min=0.0, max=1.0, **common,
+        ),
+    }
+
+
+def growth_of(obj: bpy.types.Object) -> Growth:
+    return Growth(**{name: getattr(obj.sanguine, name) for name in Growth.__dataclass_fields__})
 
 
 def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
