@@ -1,8 +1,8 @@
 """The table of scattering: Burley lobes over the chromophores that vary, as one image.
 
 Layout, from the first row up: for each quantity (weight of each lobe, then d_mm of each) one block; a block holds one tile
-per entry of axis 2, and that again per entry of axis 3; a tile has one row per entry of axis 1 and one column per entry
-of axis 0.
+per entry of axis 2, one above the other; a tile has one row per entry of axis 1 and one column per entry of axis 0. Of
+axis 3, every entry has all of that for itself, side by side.
 """
 
 from __future__ import annotations
@@ -42,7 +42,19 @@ class Table:
 
 
 def table_height(axes: tuple[Axis, ...], lobes: int = LOBES) -> int:
-    return 2 * lobes * math.prod(axis.count for axis in axes[1:])
+    return 2 * lobes * math.prod(axis.count for axis in axes[1:3])
+
+
+def table_width(axes: tuple[Axis, ...]) -> int:
+    return math.prod(axis.count for axis in (*axes[:1], *axes[3:]))
+
+
+def table_image(quantities: np.ndarray, axes: tuple[Axis, ...]) -> np.ndarray:
+    """(N, 2 * lobes, 3) of every entry, axis 0 fastest, laid out as (height, width, 3)."""
+    stacks = math.prod(axis.count for axis in axes[3:])
+    columns = axes[0].count if axes else 1
+    tiles = quantities.reshape(stacks, -1, columns, *quantities.shape[1:])  # (axis 3, axes 2 and 1, axis 0, quantity, 3)
+    return tiles.transpose(3, 1, 0, 2, 4).reshape(-1, stacks * columns, 3)
 
 
 def entry_skins(axes: tuple[Axis, ...], skin: Skin) -> np.ndarray:
@@ -66,8 +78,6 @@ def bake(
     fit = sanguine_core.burley_lobes(
         entry_skins(axes, skin), working_space, lobe_count=lobes, threads=0, progress=progress
     )
-    columns = axes[0].count if axes else 1
     quantities = np.concatenate([fit["weights"], fit["d_mm"]], axis=1)  # (N, 2 * lobes, 3)
-    image = quantities.transpose(1, 0, 2).reshape(table_height(axes, lobes), columns, 3)
-    image = np.ascontiguousarray(image, dtype=np.float32)
+    image = np.ascontiguousarray(table_image(quantities, axes), dtype=np.float32)
     return Table(axes, lobes, image, fit["clamped"].max(0), fit["fit_error"].max(0))

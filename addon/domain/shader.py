@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .effects import Fragment, ShaderInput
-from .lut import LOBES, table_height
+from .lut import LOBES, table_height, table_width
 from .plan import Axis, Plan
 from .resources import shaders_path
 
@@ -31,6 +31,7 @@ def assemble(plan: Plan) -> dict[str, Shader]:
     axes = plan.axes
     defines = {
         "AXES": len(axes),
+        "TABLE_WIDTH": float(table_width(axes)),
         "TABLE_HEIGHT": float(table_height(axes, plan.settings.lobes)),
         "FILM": int("film" in from_points),
     }

@@ -91,8 +91,8 @@ def test_a_constant_skin_map_is_what_skin_says():
 
 def test_a_tattoo_darkens_as_skin_says(monkeypatch):
     """Half a strength in the map's own sum: the map holds what is in the skin, on top of the skin's own ink."""
-    declare(monkeypatch, "tattoo", ink_per_mm=(0.0, 6.0))
-    plan = plan_of(strengths={"tattoo": 1.0, "mottle": 0.01}, ink_per_mm=0.1)
+    declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0))
+    plan = plan_of(strengths={"inked": 1.0, "mottle": 0.01}, ink_per_mm=0.1)
     assert [axis.id for axis in plan.axes] == ["hemoglobin", "melanin", "ink_per_mm"]
     thing = patch(lambda: build_skin_material("skin", plan, {"grown_ink": halves([0.0], [3.0])}))
     bare, inked = seen(thing, -1), seen(thing, 1)
@@ -103,8 +103,8 @@ def test_a_tattoo_darkens_as_skin_says(monkeypatch):
 
 def test_four_axes_are_what_skin_says(monkeypatch):
     """A tattoo and a map at once: the bilinear mix of four slices of the table."""
-    declare(monkeypatch, "tattoo", ink_per_mm=(0.0, 6.0))
-    plan = plan_of({"skin_map": ranges(LIGHT, DARK)}, {"tattoo": 1.0})
+    declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0))
+    plan = plan_of({"skin_map": ranges(LIGHT, DARK)}, {"inked": 1.0})
     assert len(plan.axes) == 4
     maps = {"skin_map": halves(values(LIGHT), values(DARK)), "grown_ink": halves([1.3], [0.0])}
     thing = patch(lambda: build_skin_material("skin", plan, maps))
@@ -113,8 +113,8 @@ def test_four_axes_are_what_skin_says(monkeypatch):
 
 
 def test_grown_factors_are_what_skin_says(monkeypatch):
-    declare(monkeypatch, "spots", log_hemoglobin=(0.0, 1.0), log_melanin=(0.0, 1.0), oxygenation=(-0.3, 0.0))
-    plan = plan_of(strengths={"spots": 1.0})
+    declare(monkeypatch, "spotted", log_hemoglobin=(0.0, 1.0), log_melanin=(0.0, 1.0), oxygenation=(-0.3, 0.0))
+    plan = plan_of(strengths={"spotted": 1.0})
     grown = halves([0.0, 0.0, 0.0, 0.0], [0.5, 0.8, 0.0, -0.25])
     thing = patch(lambda: build_skin_material("skin", plan, {"grown": grown}))
     skin = default_skin()
@@ -136,8 +136,8 @@ def test_a_residual_multiplies_and_never_makes_light():
 
 def test_height_bends_the_light(monkeypatch):
     """Waves of 0.1 mm under a low sun are bands of light; a height that is the same everywhere is no relief."""
-    declare(monkeypatch, "bumps", height_mm=(-0.1, 0.1))
-    plan = plan_of(strengths={"bumps": 1.0})
+    declare(monkeypatch, "bumpy", height_mm=(-0.1, 0.1))
+    plan = plan_of(strengths={"bumpy": 1.0})
 
     def spread(height):
         def material():

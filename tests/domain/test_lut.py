@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sanguine_core
 from sanguine.domain.effects import Frame, Scene
-from sanguine.domain.lut import LOBES, QUANTITIES, bake, entry_skins, table_height
+from sanguine.domain.lut import LOBES, QUANTITIES, bake, entry_skins, table_height, table_width
 from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
 from sanguine.domain.plan import Axis, check_strengths, make_plan, spaced
 
@@ -35,17 +35,17 @@ def test_layout_is_axis_0_along_x_then_tiles_then_quantities():
     np.testing.assert_allclose(table.image[row, i], fit["d_mm"][0, quantity], rtol=1e-5)
 
 
-def test_a_fourth_axis_stacks_the_tiles():
+def test_a_fourth_axis_stands_side_by_side():
     axes = (Axis("hemoglobin", 0.002, 0.06, 4, True), Axis("melanin", 0.01, 0.06, 3, True),
             Axis("oxygenation", 0.5, 0.95, 2, False), INK)
     table = bake(axes, default_skin(), "rec709")
-    assert table.image.shape == (QUANTITIES * 3 * 2 * 3, 4, 3) == (table_height(axes), 4, 3)
+    assert table.image.shape == (QUANTITIES * 2 * 3, 3 * 4, 3) == (table_height(axes), table_width(axes), 3)
     at = (1, 2, 1, 2)
     skin = default_skin() | {axis.id: axis.values()[n] for axis, n in zip(axes, at, strict=True)}
     fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=LOBES)
     for quantity in range(LOBES):
-        row = ((quantity * 3 + at[3]) * 2 + at[2]) * 3 + at[1]
-        np.testing.assert_allclose(table.image[row, at[0]], fit["weights"][0, quantity], rtol=1e-5)
+        row = (quantity * 2 + at[2]) * 3 + at[1]
+        np.testing.assert_allclose(table.image[row, at[3] * 4 + at[0]], fit["weights"][0, quantity], rtol=1e-5)
 
 
 def test_values_run_from_end_to_end():

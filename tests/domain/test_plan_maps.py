@@ -47,8 +47,8 @@ def test_every_native_feature_is_an_effect_that_is_off():
 
 
 def test_a_feature_widens_what_it_changes(monkeypatch):
-    declare(monkeypatch, "spots", log_melanin=(-0.5, 1.0), log_hemoglobin=(0.0, 0.8), oxygenation=(-0.2, 0.0))
-    plan = make_plan(scene(strengths={"spots": 0.5, "anatomy": 0.0}, oil=0.0))
+    declare(monkeypatch, "spotted", log_melanin=(-0.5, 1.0), log_hemoglobin=(0.0, 0.8), oxygenation=(-0.2, 0.0))
+    plan = make_plan(scene(strengths={"spotted": 0.5, "anatomy": 0.0}, oil=0.0))
     skin, found = default_skin(), axes(plan)
     assert set(found) == {"hemoglobin", "melanin", "oxygenation"}
     assert (found["melanin"].low, found["melanin"].high) == pytest.approx(
@@ -64,9 +64,9 @@ def test_a_feature_widens_what_it_changes(monkeypatch):
 
 
 def test_features_share_maps_and_fragments(monkeypatch):
-    declare(monkeypatch, "spots", log_melanin=(0.0, 1.0))
-    declare(monkeypatch, "bumps", log_hemoglobin=(0.0, 1.0), height_mm=(0.0, 0.3))
-    plan = make_plan(scene(strengths={"spots": 1.0, "bumps": 1.0}))
+    declare(monkeypatch, "spotted", log_melanin=(0.0, 1.0))
+    declare(monkeypatch, "bumpy", log_hemoglobin=(0.0, 1.0), height_mm=(0.0, 0.3))
+    plan = make_plan(scene(strengths={"spotted": 1.0, "bumpy": 1.0}))
     assert [f.file for f in plan.fragments].count("grown.osl") == 1
     text = sources(plan)
     assert text["chromophores"].count("melanin *= exp(grown[1])") == 1
@@ -74,18 +74,18 @@ def test_features_share_maps_and_fragments(monkeypatch):
     assert "height_mm += grown_height[0]" in text["relief"] and "relief *" not in text["relief"]
     assert set(plan.maps) == {"anatomy", "grown", "grown_height"}
     # Each alone leaves nothing of the other.
-    assert "relief" not in sources(plan.without("bumps"))
-    assert "#define GROWN_LOG_HEMOGLOBIN 0\n" in sources(plan.without("bumps"))["chromophores"]
+    assert "relief" not in sources(plan.without("bumpy"))
+    assert "#define GROWN_LOG_HEMOGLOBIN 0\n" in sources(plan.without("bumpy"))["chromophores"]
 
 
 @pytest.mark.parametrize("live", [False, True])
 def test_ink_is_an_axis_only_where_a_tattoo_is(monkeypatch, live):
-    declare(monkeypatch, "emblem", ink_per_mm=(0.0, 6.0))
+    declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0))
     frames = ({}, {"anger": 1.0})
     off = make_plan(scene(frames, live=live, ink_per_mm=0.5))
     assert "ink_per_mm" not in axes(off) and off.skin["ink_per_mm"] == 0.5
     assert "ink" not in "".join(sources(off).values())
-    plan = make_plan(scene(frames, {"emblem": 0.5}, live=live, ink_per_mm=0.5))
+    plan = make_plan(scene(frames, {"inked": 0.5}, live=live, ink_per_mm=0.5))
     assert [axis.id for axis in plan.axes] == ["hemoglobin", "melanin", "oxygenation", "ink_per_mm"]
     ink = axes(plan)["ink_per_mm"]
     if live:
@@ -100,7 +100,7 @@ def test_ink_is_an_axis_only_where_a_tattoo_is(monkeypatch, live):
 def test_a_declared_feature_that_is_off_changes_nothing(monkeypatch):
     frames = ({}, {"anger": 1.0})
     plain = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
-    declare(monkeypatch, "emblem", ink_per_mm=(0.0, 6.0), height_mm=(0.0, 0.1), log_oil=(0.0, 1.0))
+    declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0), height_mm=(0.0, 0.1), log_oil=(0.0, 1.0))
     plan = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
     assert sources(plan) == sources(plain) and plan.axes == plain.axes and plan.maps == plain.maps
     assert not {"grown", "skin_map", "residual"} & set(plan.maps)
@@ -136,8 +136,8 @@ def test_anatomy_keeps_what_the_map_does_not_hold():
 
 
 def test_blood_and_features_come_on_top_of_the_map(monkeypatch):
-    declare(monkeypatch, "spots", log_melanin=(0.0, 1.0))
-    plan = make_plan(scene(frames=({}, {"anger": 1.0}), strengths={"spots": 1.0}, maps={"skin_map": WHOLE}))
+    declare(monkeypatch, "spotted", log_melanin=(0.0, 1.0))
+    plan = make_plan(scene(frames=({}, {"anger": 1.0}), strengths={"spotted": 1.0}, maps={"skin_map": WHOLE}))
     found = axes(plan)
     assert found["melanin"].high == pytest.approx(WHOLE["melanin"][1] * math.e)
     assert found["hemoglobin"].high > WHOLE["hemoglobin"][1]

@@ -7,7 +7,7 @@ import pytest
 import sanguine_core as core
 from hypothesis import given
 from hypothesis import strategies as st
-from sanguine.domain.lut import LOBES, bake, entry_skins, table_height
+from sanguine.domain.lut import LOBES, bake, entry_skins, table_height, table_image, table_width
 from sanguine.domain.parameters import PARAMETERS, default_skin
 from sanguine.domain.plan import AXIS_CHROMOPHORES, Axis
 from stability import extremes
@@ -62,10 +62,9 @@ def test_a_table_is_its_float64_rounded_once():
     axes = tuple(whole_axis(name, 4) for name in AXIS_CHROMOPHORES)
     table = bake(axes, default_skin(), "acescg")
     lobes = core.burley_lobes(entry_skins(axes, default_skin()), "acescg", lobe_count=LOBES)
-    exact = np.concatenate([lobes["weights"], lobes["d_mm"]], axis=1).transpose(1, 0, 2)
-    np.testing.assert_allclose(
-        table.image, exact.reshape(table_height(axes), axes[0].count, 3), rtol=6e-8, atol=np.finfo(np.float32).tiny
-    )
+    exact = table_image(np.concatenate([lobes["weights"], lobes["d_mm"]], axis=1), axes)
+    assert exact.shape == (table_height(axes), table_width(axes), 3)
+    np.testing.assert_allclose(table.image, exact, rtol=6e-8, atol=np.finfo(np.float32).tiny)
 
 
 def lookup(axis: Axis, table: np.ndarray, value: float) -> np.ndarray:

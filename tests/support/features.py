@@ -17,6 +17,7 @@ def declare(patch: pytest.MonkeyPatch, feature_id: str, **changes: tuple[float, 
         "changes": [{"channel": name, "low": low, "high": high} for name, (low, high) in changes.items()],
     }
     effect = grown._effect(row)
+    assert feature_id not in grown.ROWS, "there is such a feature: take another name"
     patch.setitem(grown.ROWS, feature_id, row)
     known = plan.EFFECTS
     after = [other.id for other in known].index("skin_map") + 1
