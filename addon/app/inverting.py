@@ -18,8 +18,9 @@ import sanguine_core
 
 from ..domain.errors import InputError
 from ..domain.files import check_folder
-from ..domain.parameters import PARAMETERS, Skin, default_skin, skin_rows
+from ..domain.parameters import Skin, default_skin, skin_rows
 from ..domain.udim import FIRST_TILE, find_tiles, pattern_of
+from .map_files import MapHeader, header_attributes
 
 SPACES: dict[str, tuple[str, bool]] = {
     "srgb": ("rec709", True),
@@ -197,7 +198,7 @@ def invert_file(
             written = []
             for (tile, picture), model in zip(pictures.items(), models, strict=True):
                 ending = f".{tile}.exr" if several else ".exr"
-                with _Writers(Path(out_dir), ending, picture, _attributes(working_space)) as writers:
+                with _Writers(Path(out_dir), ending, picture, working_space) as writers:
                     for first, count in picture.bands():
                         low, high = max(0, first - halo), min(picture.height, first + count + halo)
                         made = sanguine_core.invert_rows(
@@ -236,19 +237,10 @@ def _space(pictures: Mapping[int, _Picture], space: str) -> str:
     return next(iter(kinds))
 
 
-def _attributes(working_space: str) -> dict[str, str]:
-    units = ", ".join(f"{name} {PARAMETERS[name].unit}" for name in _CHANNELS)
-    return {
-        "sanguine:schema": sanguine_core.__version__,
-        "sanguine:units": f"{units} (fractions of volume; oxygenation of hemoglobin), error Delta E 2000",
-        "sanguine:working_space": working_space,
-    }
-
-
 class _Writers:
     """The maps of one picture: all of them appear, or none that was begun."""
 
-    def __init__(self, folder: Path, ending: str, picture: _Picture, attributes: dict[str, str]):
+    def __init__(self, folder: Path, ending: str, picture: _Picture, working_space: str):
         channels = {
             "chromophores": list(_CHANNELS), "error": ["error"], "mask": ["mask"], "shading": ["shading"],
             "residual": ["R", "G", "B"],
@@ -261,7 +253,10 @@ class _Writers:
         self._stack = contextlib.ExitStack()
         self._writers = {
             name: self._stack.enter_context(
-                sanguine_core.MapWriter(path, picture.width, picture.height, names, attributes, True, True)
+                sanguine_core.MapWriter(
+                    path, picture.width, picture.height, names,
+                    header_attributes(names, MapHeader()) | {"sanguine:working_space": working_space}, True, True,
+                )
             )
             for (name, names), path in zip(channels.items(), self.paths, strict=True)
         }

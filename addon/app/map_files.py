@@ -32,11 +32,12 @@ CHANNELS: dict[str, str] = {p.channel: p.unit for p in PARAMETERS.values() if p.
     "log_oil": "1",
     "oxygenation_change": "1",
     "height_mm": "mm",
-    "R": "1",  # factor on the light that left the skin
+    "R": "1",  # of the residual: a factor on the light that left the skin
     "G": "1",
     "B": "1",
-    "delta_e_2000": "1",
+    "shading": "1",  # of the light in a picture: a factor
     "mask": "1",
+    "error": "Delta E 2000",
 }
 """Every channel that a map may have, with its unit ("1": a fraction or a factor)."""
 

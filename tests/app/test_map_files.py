@@ -8,9 +8,10 @@ import sanguine_core
 from hypothesis import given
 from hypothesis import strategies as st
 from sanguine.app import map_files
+from sanguine.app.inverting import invert_file
 from sanguine.app.map_files import MapHeader, bands, read_header, read_maps, write_maps
 from sanguine.domain.errors import InputError
-from sanguine.domain.parameters import PARAMETERS
+from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
 
 HEADER = MapHeader(mesh="0a1b", seed=7, features={"freckles": 0.5, "moles": 1.0})
 NAMES = ("melanin", "hemoglobin", "oxygenation")
@@ -71,6 +72,20 @@ def test_a_set_of_tiles(tmp_path):
             np.testing.assert_array_equal(maps.tiles[tile], pixels)
     assert list(read_maps(tmp_path / "a.<UDIM>.exr", tiles=[1012]).tiles) == [1012]
     assert one_line(tmp_path / "a.<UDIM>.exr", tiles=[1001, 1002]).endswith("tile 1002 missing, the UVs use it")
+
+
+def test_what_an_inversion_writes_is_read(tmp_path):
+    skins = skin_rows([default_skin() | {"hemoglobin": h} for h in (0.01, 0.02, 0.03, 0.04)])
+    nm = np.arange(380.0, 781.0, 5.0)
+    rgb = sanguine_core.linear_rgb(sanguine_core.xyz(sanguine_core.reflectance(skins, nm), nm), "rec709")
+    picture = np.tile(rgb.astype(np.float32)[None], (4, 4, 1)).repeat(4, axis=1)
+    for tile in (1001, 1002):
+        sanguine_core.write_image(tmp_path / f"skin.{tile}.exr", picture, "float")
+    invert_file(tmp_path / "skin.<UDIM>.exr", tmp_path)
+    maps = read_maps(tmp_path / "chromophores.<UDIM>.exr", ["hemoglobin", "melanin", "oxygenation"], tiles=[1001, 1002])
+    assert maps.tiles[1002].shape == (4, 64, 3) and maps.header.mesh == ""
+    for name in ("error", "mask", "shading", "residual"):
+        assert list(read_maps(tmp_path / f"{name}.1001.exr").tiles) == [1001, 1002]
 
 
 def test_tiles_of_different_maps_are_refused(tmp_path):
@@ -142,8 +157,8 @@ def test_wrong_channels_and_values_are_one_line(tmp_path):
     assert "channel 'red' is none of Sanguine's" in one_line(path, channels=["red"])
     assert "was made for another mesh" in one_line(path, mesh="ffff")
     assert read_maps(path, mesh="0a1b").header == HEADER
-    write_raw(path, good_attributes(), ("X", "Y", "Z"))
-    assert "channel 'X' is none of Sanguine's" in one_line(path)
+    write_raw(path, good_attributes(), ("a", "b", "c"))
+    assert "channel 'a' is none of Sanguine's" in one_line(path)
     write_raw(path, good_attributes(), NAMES, PIXELS + 1)
     assert "channel 'hemoglobin' holds 1" in one_line(path) and "0 to 0.25 are allowed" in one_line(path)
     for bad in (np.nan, np.inf, -np.inf):
