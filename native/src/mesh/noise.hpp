@@ -30,7 +30,8 @@ struct Fbm {
     glm::vec3 vector(glm::vec3 place_mm, float size_mm) const;
 };
 
-/// How much of a structure of `wavelength_mm` texels of `size_mm` can hold: 1 from four texels a wave, 0 below two.
-inline float held(float wavelength_mm, float size_mm) { return smooth_step(2, 4, wavelength_mm / size_mm); }
+/// How much of noise of `wavelength_mm` texels of `size_mm` can hold: 1 from six texels a wave, 0 below three. Gradient
+/// noise has waves of half its own length as well, and what texels cannot hold shows at seams, where they shift.
+inline float held(float wavelength_mm, float size_mm) { return smooth_step(3, 6, wavelength_mm / size_mm); }
 
 }  // namespace sanguine

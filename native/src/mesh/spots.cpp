@@ -10,13 +10,14 @@ constexpr int steps_per_octave = 8;
 
 }
 
-Spots::Spots(std::vector<Spot> spots, float softness) : softness_(softness), spots_(std::move(spots)) {
+Spots::Spots(std::vector<Spot> spots, float softness, float aside_mm)
+    : softness_(softness), spots_(std::move(spots)) {
     if (spots_.empty()) return;
     std::vector<PlaceGrid::Box> boxes;
     smallest_mm_ = std::numeric_limits<float>::infinity();
     float largest = 0;
     for (const Spot& spot : spots_) {
-        const glm::vec3 reach(2 * spot.radius_mm * (1 + softness_));  // faded() ends before
+        const glm::vec3 reach(2 * spot.radius_mm * (1 + softness_) + aside_mm);  // faded() ends before
         boxes.push_back({spot.place_mm - reach, spot.place_mm + reach});
         smallest_mm_ = std::min(smallest_mm_, spot.radius_mm);
         largest = std::max(largest, spot.radius_mm);

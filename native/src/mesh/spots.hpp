@@ -43,12 +43,13 @@ inline float spot_area(float softness) { return 3.14159265F * (1 + softness * so
 class Spots {
 public:
     Spots() = default;
-    Spots(std::vector<Spot> spots, float softness);
+    /// `aside_mm`: how far places may be pushed aside, in each direction, before they are looked up.
+    Spots(std::vector<Spot> spots, float softness, float aside_mm = 0);
 
     std::span<const Spot> spots() const { return spots_; }
 
     /// visit(index, strength of the spot here, distance / radius) for each spot that reaches the place.
-    /// `lookup_mm` is the place pushed aside to give spots an irregular rim, by less than a quarter of the radius.
+    /// `lookup_mm` is the place, pushed aside to give spots an irregular rim.
     template <typename Visit>
     void at(const SkinPlace& place, glm::vec3 lookup_mm, const Visit& visit) const {
         for (const std::uint32_t i : grid_.at(lookup_mm)) {
@@ -63,6 +64,9 @@ public:
             visit(i, spot.strength * share * radius2 / seen2 * spot_profile(x, softness_), x);
         }
     }
+
+    /// False where no spot reaches, wherever the place is pushed: then there is no need to ask.
+    bool near(glm::vec3 place_mm) const { return !grid_.at(place_mm).empty(); }
 
     /// Sum of the strengths at the place.
     float sum(const SkinPlace& place, glm::vec3 lookup_mm) const {
@@ -97,7 +101,7 @@ public:
     /// mark(random, place) says what grows at each of the points; see scatter() for the rest.
     template <typename MarkOf>
     ScatteredSpots(const SkinSurface& surface, std::vector<float> density_per_mm2, float spacing, float softness,
-                   std::uint64_t seed, const MarkOf& mark)
+                   std::uint64_t seed, const MarkOf& mark, float aside_mm = 0)
         : surface_(&surface), density_(std::move(density_per_mm2)) {
         std::vector<Spot> spots;
         for (const Seedling& s : scatter(surface, density_, spacing, seed)) {
@@ -105,7 +109,7 @@ public:
             const Mark m = mark(random, s);
             spots.push_back({s.place_mm, s.normal, m.radius_mm, m.strength});
         }
-        spots_ = Spots(std::move(spots), softness);
+        spots_ = Spots(std::move(spots), softness, aside_mm);
     }
 
     const Spots& spots() const { return spots_; }

@@ -13,6 +13,7 @@ constexpr float reddest = 1.5F;
 constexpr float darkest = 1.2F;
 constexpr float most_oxygen = 0.18F;
 constexpr float highest_mm = 0.8F;
+constexpr float aside_mm = 0.8F;
 
 class Grown final : public GrownFeature {
 public:
@@ -44,15 +45,15 @@ public:
         red_ = {surface, papules, 0.3F, 0.5F, one, [&](Random& random, const Seedling&) {
                     const Papule p = papule(random);
                     return ScatteredSpots::Mark{p.radius_mm, 0.95F * p.fresh};
-                }};
+                }, aside_mm};
         halo_ = {surface, papules, 0.3F, 0.9F, one, [&](Random& random, const Seedling&) {
                      const Papule p = papule(random);
                      return ScatteredSpots::Mark{p.radius_mm * random.uniform(1.8F, 2.8F), 0.25F + 0.35F * p.fresh};
-                 }};
+                 }, aside_mm};
         bump_ = {surface, papules, 0.3F, 0.8F, one, [&](Random& random, const Seedling&) {
                      const Papule p = papule(random);
                      return ScatteredSpots::Mark{0.9F * p.radius_mm, 0.3F * p.radius_mm * p.fresh};
-                 }};
+                 }, aside_mm};
         open_ = {surface, std::move(open), 0.3F, 0.4F, seed_for(seed, "open"), [](Random& random, const Seedling&) {
                      return ScatteredSpots::Mark{random.uniform(0.2F, 0.5F), random.uniform(0.5F, 1)};
                  }};
@@ -65,7 +66,10 @@ public:
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
             const SkinPlace& place = places[i];
-            const glm::vec3 lookup = place.place_mm + 0.8F * rim_.vector(place.place_mm, place.size_mm);
+            const bool near = red_.spots().near(place.place_mm) || halo_.spots().near(place.place_mm) ||
+                              bump_.spots().near(place.place_mm);
+            const glm::vec3 aside = near ? aside_mm * rim_.vector(place.place_mm, place.size_mm) : glm::vec3(0);
+            const glm::vec3 lookup = place.place_mm + aside;
             float* layer = &out[4 * i];
             const float red = std::min(reddest, red_(place, lookup) + halo_(place, lookup));
             layer[0] = red;

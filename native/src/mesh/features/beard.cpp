@@ -14,7 +14,7 @@ namespace sanguine {
 namespace {
 
 constexpr float darkest = 1.6F;
-constexpr float most_ink_per_mm = 0.35F;
+constexpr float most_ink_per_mm = 0.2F;
 
 class Grown final : public GrownFeature {
 public:
@@ -58,7 +58,7 @@ public:
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
             const float root = surface_.value_at(places[i].point, roots_);
-            out[2 * i] = root == 0 ? 0 : std::min(darkest, dots_(places[i], places[i].place_mm));
+            out[2 * i] = root == 0 ? 0 : std::min(darkest, 0.15F * root + dots_(places[i], places[i].place_mm));
             out[2 * i + 1] = most_ink_per_mm * std::min(1.0F, root);
         }
     }

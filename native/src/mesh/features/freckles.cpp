@@ -10,6 +10,7 @@ namespace sanguine {
 namespace {
 
 constexpr float strongest = 1.5F;
+constexpr float aside_mm = 0.5F;
 
 class Grown final : public GrownFeature {
 public:
@@ -31,12 +32,14 @@ public:
                       const float radius = 0.35F + 1.15F * large * large + random.uniform(0, 0.25F);
                       const float dark = 0.25F + 0.45F * large + random.uniform(0, 0.3F);
                       return ScatteredSpots::Mark{radius, dark * (0.45F + 0.85F * sun)};
-                  }};
+                  }, aside_mm};
     }
 
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
-            const glm::vec3 aside = 0.5F * rim_.vector(places[i].place_mm, places[i].size_mm);
+            const glm::vec3 aside = spots_.spots().near(places[i].place_mm)
+                                        ? aside_mm * rim_.vector(places[i].place_mm, places[i].size_mm)
+                                        : glm::vec3(0);
             out[i] = std::min(strongest, spots_(places[i], places[i].place_mm + aside));
         }
     }

@@ -10,6 +10,7 @@ namespace sanguine {
 namespace {
 
 constexpr float strongest = 1.4F;
+constexpr float aside_mm = 3.2F;
 
 class Grown final : public GrownFeature {
 public:
@@ -26,13 +27,15 @@ public:
                       const float large = random.uniform(0, 1);
                       return ScatteredSpots::Mark{1.5F + 3.5F * large * large + random.uniform(0, 0.8F),
                                                   random.uniform(0.35F, 0.85F) * (0.6F + 0.5F * exposed)};
-                  }};
+                  }, aside_mm};
     }
 
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
             const SkinPlace& place = places[i];
-            const glm::vec3 aside = 3.2F * rim_.vector(place.place_mm, place.size_mm);
+            const glm::vec3 aside = spots_.spots().near(place.place_mm)
+                                        ? aside_mm * rim_.vector(place.place_mm, place.size_mm)
+                                        : glm::vec3(0);
             const float value = spots_(place, place.place_mm + aside);
             out[i] = value == 0 ? 0
                                 : std::min(strongest, value * (1 + 0.9F * mottle_(place.place_mm, place.size_mm)));

@@ -11,6 +11,7 @@ namespace {
 
 constexpr float strongest = 2.2F;
 constexpr float highest_mm = 1.2F;
+constexpr float aside_mm = 0.7F;
 
 class Grown final : public GrownFeature {
 public:
@@ -38,17 +39,19 @@ public:
         pigment_ = {surface, density, 0.2F, 0.35F, seed, [&](Random& random, const Seedling&) {
                         const Mole m = mole(random);
                         return ScatteredSpots::Mark{m.radius_mm, m.dark};
-                    }};
+                    }, aside_mm};
         relief_ = {surface, density, 0.2F, 0.7F, seed, [&](Random& random, const Seedling&) {
                        const Mole m = mole(random);
                        return ScatteredSpots::Mark{m.radius_mm, m.high_mm};
-                   }};
+                   }, aside_mm};
     }
 
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
             const SkinPlace& place = places[i];
-            const glm::vec3 lookup = place.place_mm + 0.7F * rim_.vector(place.place_mm, place.size_mm);
+            const bool near = pigment_.spots().near(place.place_mm) || relief_.spots().near(place.place_mm);
+            const glm::vec3 aside = near ? aside_mm * rim_.vector(place.place_mm, place.size_mm) : glm::vec3(0);
+            const glm::vec3 lookup = place.place_mm + aside;
             const float dark = pigment_(place, lookup);
             out[2 * i] = dark == 0 ? 0
                                    : std::clamp(dark * (1 + 0.35F * mottle_(place.place_mm, place.size_mm)), 0.0F,

@@ -27,9 +27,9 @@ public:
             const glm::vec3 eye = is_left ? *left : *right;
             const float out = (is_left ? 1 : -1) * (p.x - eye.x) / unit, up = (p.z - eye.z) / unit;
             // The hollow follows the rim of the orbit: lowest under the pupil, rising to both corners.
-            const float rim = -10.5F + 0.022F * (out + 2) * (out + 2);
+            const float rim = -10.5F + 0.02F * (out + 4) * (out + 4);
             const float below = 1 - smooth_step(1, up > rim ? 7 : 11, std::abs(up - rim));
-            const float width = 1 - smooth_step(9, 22, std::abs(out + 2));
+            const float width = 1 - smooth_step(9, 22, std::abs(out + 4));
             const float before = 1 - smooth_step(18, 40, std::abs(p.y - eye.y) / unit);
             const float facing = smooth_step(-0.2F, 0.3F, -surface.normal()[v].y);
             const float hollow = below * width * before * facing * std::clamp(0.9F - 0.02F * out, 0.4F, 1.2F);

@@ -16,8 +16,8 @@ class Grown final : public GrownFeature {
 public:
     Grown(const SkinSurface& surface, const Person& person, std::uint64_t seed)
         : surface_(surface),
-          blood_{1.6F, 4, 0.75F, std::uint32_t(seed)},
-          pigment_{1.1F, 4, 0.75F, std::uint32_t(seed >> 32)},
+          blood_{3, 5, 0.8F, std::uint32_t(seed)},
+          pigment_{2.2F, 5, 0.8F, std::uint32_t(seed >> 32)},
           relief_{0.6F, 2, 0.6F, std::uint32_t(mix(seed))} {
         // Openings in a square millimetre and their radius. Forehead: 2.9 follicles, small ones (Otberg). Nose and
         // cheeks show fewer and wider ones (of 0.25 mm and more on cheeks: Flament); the numbers there are guesses.
@@ -43,8 +43,8 @@ public:
             const float pit = pits_(place, place.place_mm);
             const float skin = surface_.value_at(place.point, lips_);
             const auto noise = [&](const Fbm& fbm) { return fbm(place.place_mm, place.size_mm); };
-            out[3 * i] = std::clamp(skin * 0.9F * noise(blood_), -blood, blood);
-            out[3 * i + 1] = std::clamp(0.35F * pit + skin * 0.5F * noise(pigment_), least_pigment, most_pigment);
+            out[3 * i] = std::clamp(skin * 1.1F * noise(blood_), -blood, blood);
+            out[3 * i + 1] = std::clamp(0.35F * pit + skin * 0.65F * noise(pigment_), least_pigment, most_pigment);
             out[3 * i + 2] =
                 std::clamp(-0.08F * pit + skin * 0.04F * noise(relief_), deepest_mm, highest_mm);
         }

@@ -12,6 +12,7 @@ namespace {
 constexpr float reddest = 1.3F;
 constexpr float most_oxygen = 0.15F;
 constexpr float highest_mm = 0.25F;
+constexpr float aside_mm = 0.9F;
 
 class Grown final : public GrownFeature {
 public:
@@ -27,7 +28,7 @@ public:
         }
         spots_ = {surface, std::move(density), 0.45F, 0.7F, seed, [](Random& random, const Seedling&) {
                       return ScatteredSpots::Mark{random.uniform(0.9F, 2.8F), random.uniform(0.3F, 0.7F)};
-                  }};
+                  }, aside_mm};
     }
 
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
@@ -38,7 +39,7 @@ public:
                 std::fill_n(&out[3 * i], 3, 0.0F);
                 continue;
             }
-            const glm::vec3 lookup = place.place_mm + 0.9F * rim_.vector(place.place_mm, place.size_mm);
+            const glm::vec3 lookup = place.place_mm + aside_mm * rim_.vector(place.place_mm, place.size_mm);
             const float spots = spots_(place, lookup);
             // Where they stand dense the skin between them is red as well.
             const float between =

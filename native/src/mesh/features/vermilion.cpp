@@ -10,7 +10,7 @@
 namespace sanguine {
 namespace {
 
-constexpr float most_blood = 1.3F, least_pigment = -0.8F, most_oxygen = 0.12F, deepest_mm = -0.08F;
+constexpr float most_blood = 1.6F, least_pigment = -0.4F, most_oxygen = 0.12F, deepest_mm = -0.08F;
 
 class Grown final : public GrownFeature {
 public:
@@ -33,10 +33,10 @@ public:
             // The line: the outermost part is paler and even, the red stands a millimetre inside.
             const float inner = smooth_step(0.45F, 0.95F, edge);
             const float groove = lip * groove_at(place);
-            out[4 * i] = std::clamp(lip * (0.55F + 0.4F * inner + 0.35F * uneven_(place.place_mm, place.size_mm)) +
+            out[4 * i] = std::clamp(lip * (0.75F + 0.45F * inner + 0.35F * uneven_(place.place_mm, place.size_mm)) +
                                         0.25F * groove,
                                     0.0F, most_blood);
-            out[4 * i + 1] = std::max(least_pigment, -lip * (0.35F + 0.4F * inner));
+            out[4 * i + 1] = std::max(least_pigment, -lip * (0.15F + 0.2F * inner));
             out[4 * i + 2] = most_oxygen * lip;  // well supplied
             out[4 * i + 3] = std::max(deepest_mm, -0.08F * groove);
         }
