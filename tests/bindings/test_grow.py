@@ -82,14 +82,14 @@ def test_texels_are_where_the_layout_says(head):
 @pytest.mark.parametrize("feature", FEATURES)
 def test_layers_stay_in_their_range(head, feature):
     surface, texels = head
-    for person in ({}, {"age_years": 0.0, "sun": 0.0, "masculinity": 0.0}, {"age_years": 100.0, "sun": 1.0, "masculinity": 1.0}):
-        layer = grow(feature, surface, texels, **person)
+    for age_years, sun, masculinity in [(0.0, 0.0, 0.0), (100.0, 1.0, 1.0), (45.0, 0.7, 0.6)]:
+        layer = grow(feature, surface, texels, age_years=age_years, sun=sun, masculinity=masculinity)
         changes = FEATURES[feature]["changes"]
         assert layer.dtype == np.float32 and layer.shape == (len(texels.texel), len(changes))
         assert np.isfinite(layer).all()
         assert (layer >= np.float32([c["low"] for c in changes])).all()
         assert (layer <= np.float32([c["high"] for c in changes])).all()
-    # An old man in the sun has something of everything.
+    # Who is no longer young, has been in the sun and has some beard has something of everything.
     assert (layer != 0).any(axis=0).all()
 
 
@@ -97,7 +97,8 @@ def test_layers_stay_in_their_range(head, feature):
 def test_same_seed_same_bytes_for_any_number_of_threads(head, feature):
     surface, texels = head
     one = grow(feature, surface, texels, seed=2**64 - 1, threads=1)
-    again = grow(feature, sanguine_core.SkinSurface(**ball()), surface.texels(256, 256, 2, threads=3), seed=2**64 - 1, threads=5)
+    surface = sanguine_core.SkinSurface(**ball())
+    again = grow(feature, surface, surface.texels(256, 256, 2, threads=3), seed=2**64 - 1, threads=5)
     assert one.tobytes() == again.tobytes()
 
 

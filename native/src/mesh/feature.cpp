@@ -110,7 +110,8 @@ TexelMap map_texels(const SkinSurface& surface, int width, int height, int paddi
                 shown[std::size_t(y) * std::size_t(width) + std::size_t(x) - start] = {triangle, barycentric};
             });
         Band& band = bands[b];
-        const auto count = std::ranges::count_if(shown, [](const SurfacePoint& p) { return p.triangle != SkinSurface::none; });
+        const auto count = std::ranges::count_if(
+            shown, [](const SurfacePoint& p) { return p.triangle != SkinSurface::none; });
         band.texel.reserve(std::size_t(count));
         band.place.reserve(std::size_t(count));
         for (std::size_t i = 0; i < shown.size(); ++i) {

@@ -79,7 +79,7 @@ private:
     glm::ivec3 cell_of(glm::vec3 place) const { return glm::ivec3(glm::floor(place / cell_mm_)); }
     /// Cells that share a key share a list, which only costs time.
     static std::uint64_t key(glm::ivec3 c) {
-        return mix(std::uint64_t(std::uint32_t(c.x)) << 32 ^ mix(std::uint64_t(std::uint32_t(c.y)) << 32 | std::uint32_t(c.z)));
+        return mix(std::uint32_t(c.x) ^ mix(std::uint64_t(std::uint32_t(c.y)) << 32 | std::uint32_t(c.z)));
     }
 
     float cell_mm_;

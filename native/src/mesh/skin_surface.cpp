@@ -106,7 +106,8 @@ SkinSurface::SkinSurface(const SkinMesh& mesh) : uv_(mesh.uv.begin(), mesh.uv.en
             welded[i] = welded[first[i]];
         }
         for (std::size_t r = 0; r < regions; ++r)
-            region_weights_[r][welded[i]] = std::max(region_weights_[r][welded[i]], mesh.region_weights[i * regions + r]);
+            region_weights_[r][welded[i]] =
+                std::max(region_weights_[r][welded[i]], mesh.region_weights[i * regions + r]);
     }
     no_region_.assign(position_mm_.size(), 0);
 

@@ -13,6 +13,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "triangle.hpp"
+
 namespace sanguine {
 
 using UvTriangle = std::array<glm::dvec2, 3>;
@@ -27,10 +29,6 @@ inline UvTriangle corners_of(std::span<const glm::vec2> uv, glm::uvec3 corner) {
 
 /// Written so that a coordinate that is not finite answers true as well.
 inline bool is_degenerate(const UvTriangle& triangle) { return !(std::abs(twice_area(triangle)) > 1e-14); }
-
-/// Barycentric coordinates of the point of the triangle nearest to `p` (Ericson, Real-Time Collision Detection,
-/// 5.1.5): those of `p` itself where it lies inside.
-glm::dvec3 nearest_barycentric(const UvTriangle& t, glm::dvec2 p);
 
 /// Rows [first_row, end_row) of an image over the unit square of UV; row 0 is V = 0. Every band sees all triangles in
 /// the same order and owns its rows, so the result does not depend on how an image is cut into bands.

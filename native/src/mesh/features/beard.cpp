@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {
@@ -20,20 +20,23 @@ class Grown final : public GrownFeature {
 public:
     Grown(const SkinSurface& surface, const Person& person, std::uint64_t seed) : surface_(surface) {
         roots_.assign(surface.position_mm().size(), 0);
-        const auto face = face_frame(surface);
+        const auto face = StandardFace::of(surface);
+        const auto lips = middle_mm(surface, "lips");
         const float man = float(person.masculinity) * smooth_step(13, 22, float(person.age_years));
-        if (!face || man == 0) return;
+        if (!face || !lips || man == 0) return;
 
-        const auto bare = by_region(surface, {{"lips", 0}, {"nose", 0}, {"eyelids", 0}, {"forehead", 0}, {"ears", 0}}, 1);
+        const auto bare =
+            by_region(surface, {{"lips", 0}, {"nose", 0}, {"eyelids", 0}, {"forehead", 0}, {"ears", 0}}, 1);
         const Fbm edge{14, 3, 0.55F, std::uint32_t(seed)};
-        const float unit = face->eye_distance_mm, height = (face->left_eye_mm.z + face->right_eye_mm.z) / 2 - face->lips_mm.z;
+        const glm::vec3 mouth = face->standard(*lips);
+        const float height = std::max(1.0F, -mouth.z), unit = StandardFace::eyes_mm;
         for (std::size_t v = 0; v < roots_.size(); ++v) {
-            const glm::vec3 p = surface.position_mm()[v];
+            const glm::vec3 p = surface.position_mm()[v], q = face->standard(p);
             // Up: 0 at the mouth, 1 at the eyes. Out: 0 in the middle, 1 an eye distance aside. Back: the same, from
             // the mouth backward.
             const float soft = 0.16F * edge(p, 0);
-            const float up = (p.z - face->lips_mm.z) / height + soft;
-            const float out = std::abs(p.x - face->middle_x_mm) / unit, back = (p.y - face->lips_mm.y) / unit;
+            const float up = (q.z - mouth.z) / height + soft;
+            const float out = std::abs(q.x) / unit, back = (q.y - mouth.y) / unit;
             // Upper limit of the hair: the moustache reaches the nose, the cheek is free above a line from the mouth's
             // corner to the sideburn.
             const float moustache = 0.42F - 1.6F * std::max(0.0F, out - 0.28F);

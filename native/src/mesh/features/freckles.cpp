@@ -1,10 +1,10 @@
 // Ephelides: small flecks of pigment on the sun-lit middle of the face.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

@@ -1,10 +1,10 @@
 // Solar lentigines: the larger, uneven patches of pigment of skin that has seen much sun for long.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

@@ -1,10 +1,10 @@
 // Melanocytic nevi of face and neck: flat ones and domes.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {
@@ -17,20 +17,17 @@ public:
     Grown(const SkinSurface& surface, const Person&, std::uint64_t seed)
         : surface_(surface), uneven_{12, 3, 0.5F, std::uint32_t(seed)} {
         const auto lids = surface.region("eyelids");
-        const auto left = middle_mm(surface, "eyelids", Side::left), right = middle_mm(surface, "eyelids", Side::right);
         dark_.assign(surface.position_mm().size(), 0);
-        if (!left || !right) return;
-        const float unit = (left->x - right->x) / 62;  // mm of an adult's face
+        const auto face = StandardFace::of(surface);
+        if (!face) return;
         for (std::size_t v = 0; v < dark_.size(); ++v) {
-            const glm::vec3 p = surface.position_mm()[v];
-            const bool is_left = p.x > (left->x + right->x) / 2;
-            const glm::vec3 eye = is_left ? *left : *right;
-            const float out = (is_left ? 1 : -1) * (p.x - eye.x) / unit, up = (p.z - eye.z) / unit;
+            const glm::vec3 p = face->standard(surface.position_mm()[v]);
+            const float out = std::abs(p.x) - StandardFace::eyes_mm / 2, up = p.z;
             // The hollow follows the rim of the orbit: lowest under the pupil, rising to both corners.
             const float rim = -10.5F + 0.02F * (out + 4) * (out + 4);
             const float below = 1 - smooth_step(1, up > rim ? 7 : 11, std::abs(up - rim));
             const float width = 1 - smooth_step(9, 22, std::abs(out + 4));
-            const float before = 1 - smooth_step(18, 40, std::abs(p.y - eye.y) / unit);
+            const float before = 1 - smooth_step(18, 40, std::abs(p.y));
             const float facing = smooth_step(-0.2F, 0.3F, -surface.normal()[v].y);
             const float hollow = below * width * before * facing * std::clamp(0.9F - 0.02F * out, 0.4F, 1.2F);
             dark_[v] = std::min(1.0F, 0.95F * hollow + lids[v] * (up > -2 ? 0.4F : 0.3F) * facing);

@@ -1,10 +1,10 @@
 // What skin is at the scale of its pores: pits, plugs, and blood and pigment that are never even.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

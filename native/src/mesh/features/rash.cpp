@@ -1,10 +1,10 @@
 // A maculopapular rash: red spots that run together in patches of cheeks and neck.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

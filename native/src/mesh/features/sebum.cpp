@@ -1,10 +1,10 @@
 // Oil by zones: forehead, nose and chin shine, cheeks and lids do not, and it comes out of pores.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "spots.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

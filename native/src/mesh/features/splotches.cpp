@@ -1,10 +1,10 @@
 // The uneven ground of all skin: soft patches of more and less blood, oxygen and pigment.
 #include <algorithm>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {

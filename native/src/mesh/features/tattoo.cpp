@@ -7,10 +7,10 @@
 
 #include <glm/geometric.hpp>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {
@@ -117,23 +117,17 @@ class Grown final : public GrownFeature {
 public:
     Grown(const SkinSurface& surface, const Person& person, std::uint64_t seed)
         : uneven_{1.5F, 3, 0.6F, std::uint32_t(seed)} {
-        const auto face = face_frame(surface);
+        const auto face = StandardFace::of(surface);
         if (!face) return;
         Random random(seed);
-        const bool left = random.uniform() < 0.5;
-        const float side = left ? 1.0F : -1.0F, unit = face->eye_distance_mm / 62;
-        const glm::vec3 eye = left ? face->left_eye_mm : face->right_eye_mm;
-        // Temple, cheekbone, side of the neck: as offsets (out, back, up) from the eye of a face of the usual size.
-        constexpr std::array places{glm::vec3(40, 22, 14), glm::vec3(24, 8, -38), glm::vec3(24, 75, -138)};
+        const float side = random.uniform() < 0.5 ? 1 : -1;
+        // Temple, cheekbone, side of the neck.
+        constexpr std::array places{glm::vec3(71, 22, 14), glm::vec3(55, 8, -38), glm::vec3(55, 75, -138)};
         const auto where = std::size_t(random.uniform() * 3);
-        const glm::vec3 offset = unit * places[where];
-        const glm::vec3 wanted = eye + glm::vec3(side * offset.x, offset.y, offset.z);
-        std::size_t nearest = 0;
-        for (std::size_t v = 0; v < surface.position_mm().size(); ++v)
-            if (glm::distance(surface.position_mm()[v], wanted) < glm::distance(surface.position_mm()[nearest], wanted))
-                nearest = v;
-        middle_mm_ = surface.position_mm()[nearest];
-        normal_ = surface.normal()[nearest];
+        const SurfacePoint middle =
+            nearest_point(surface, face->place_mm(places[where] * glm::vec3(side, 1, 1)));
+        middle_mm_ = surface.place_mm(middle);
+        normal_ = surface.normal_at(middle);
         const glm::vec3 straight = glm::vec3(0, 0, 1) - normal_.z * normal_;
         up_ = glm::length(straight) > 1e-3F ? glm::normalize(straight) : glm::vec3(1, 0, 0);
         right_ = glm::cross(up_, normal_);
@@ -142,7 +136,7 @@ public:
 
         const auto motif = std::size_t(random.uniform() * 3);
         strokes_ = motif == 0 ? sprig() : motif == 1 ? rose() : band();
-        const float scale = unit * (where == 2 ? random.uniform(1.2F, 1.6F) : random.uniform(0.6F, 0.8F));
+        const float scale = face->scale() * (where == 2 ? random.uniform(1.2F, 1.6F) : random.uniform(0.6F, 0.8F));
         for (Stroke& stroke : strokes_) {
             stroke.from *= scale;
             stroke.to *= scale;

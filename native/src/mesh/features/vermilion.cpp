@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "face.hpp"
 #include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
+#include "standard_face.hpp"
 
 namespace sanguine {
 namespace {
