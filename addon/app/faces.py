@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import sanguine_core
 
-from ..domain.head import Head, build_head, load_presets, load_regions
+from ..domain.head import Head, MeshPart, build_head, load_presets, load_regions
 from ..domain.resources import rigs_path
+from ..domain.strain import ShapeKeys
 from .maps import Surface
 
 
@@ -29,7 +30,15 @@ def head_surface(head: Head) -> Surface:
         triangles=np.ascontiguousarray(triangles, dtype=np.int32),
         corner_vertex=np.ascontiguousarray(skin.faces.ravel(), dtype=np.int32),
         regions=head.regions,
+        keys=_keys(skin),
     )
+
+
+def _keys(skin: MeshPart) -> ShapeKeys:
+    delta_mm = np.zeros((len(skin.shape_keys), *skin.vertices.shape), dtype=np.float32)
+    for dense, key in zip(delta_mm, skin.shape_keys.values(), strict=True):
+        dense[key.indices] = key.delta * np.float32(1000.0)
+    return ShapeKeys(tuple(skin.shape_keys), delta_mm)
 
 
 def _read_top_down(path: Path) -> np.ndarray:

@@ -7,15 +7,20 @@ cache holds: a layer is kept by the face, the feature and the person, so a chang
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import sanguine_core
 
+from ..domain import strain, wrinkles
 from ..domain.blood import ANATOMY, Rest
 from ..domain.effects import Growth, anatomy, grown
+from ..domain.effects import strain as strain_effect
+from ..domain.effects import wrinkles as wrinkles_effect
 from ..domain.effects.regions import region_images
+from ..domain.errors import InputError
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes
 from ..domain.udim import FIRST_TILE, tile_offset, tiles_of
@@ -23,6 +28,9 @@ from .map_cache import MapCache, key_of
 
 # Texels that repeat a UV island's edge outward, so that filtering never meets the background.
 _PADDING = 16
+
+# Texels along a side beyond which furrows some millimetres apart gain nothing.
+_LARGEST_WRINKLES = 2048
 
 Progress = Callable[[int, int], bool]
 
@@ -33,6 +41,7 @@ class Surface:
 
     position_mm: (V, 3) float32, of the neutral face. uv: (L, 2) float32 per face corner. triangles: (T, 3) int32 into
     corners. corner_vertex: (L,) int32. regions: region id -> (V,) float32 mask, 0-1, in the order of the vertices.
+    keys: what its shape keys move, if it has any.
     """
 
     position_mm: np.ndarray
@@ -40,6 +49,26 @@ class Surface:
     triangles: np.ndarray
     corner_vertex: np.ndarray
     regions: Mapping[str, np.ndarray]
+    keys: strain.ShapeKeys | None = None
+
+    @cached_property
+    def moving(self) -> strain.MovingSurface:
+        """The face as its shape keys move it. Raises InputError when it has none."""
+        if self.keys is None or not self.keys.names:
+            raise InputError("the face has no shape keys, from which strain and wrinkles come: switch these effects off")
+        triangles = np.ascontiguousarray(self.corner_vertex[self.triangles], dtype=np.int32)
+        return strain.MovingSurface(self.position_mm, triangles, self.keys)
+
+    @cached_property
+    def furrows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Depth in mm and phase of the furrows of every fold pattern, each (C, V)."""
+        return wrinkles.furrow_fields(self.moving, self.regions)
+
+    @cached_property
+    def motion_digest(self) -> str:
+        """`digest`, the shape keys, and the code that turns them into maps."""
+        recipe = [Path(module.__file__).read_text(encoding="utf-8") for module in (strain, wrinkles)]
+        return key_of(self.digest, list(self.moving.keys.names), self.moving.keys.delta_mm, recipe)
 
     @cached_property
     def region_weights(self) -> np.ndarray:
@@ -63,7 +92,7 @@ class Surface:
         if tile == FIRST_TILE:
             return self
         offset = np.array(tile_offset(tile), dtype=np.float32)
-        return Surface(self.position_mm, self.uv - offset, self.triangles, self.corner_vertex, self.regions)
+        return replace(self, uv=self.uv - offset)
 
 
 class Grown:
@@ -146,7 +175,45 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
     if name in grown.MAPS:
         strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
         return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
+    if name in strain_effect.IMAGES:
+        key = key_of(face.motion_digest, name, size, _PADDING)
+        return cache.get(key, lambda: _components(face, size, face.moving.area.values, strain_effect.IMAGES.index(name)))
+    if name in wrinkles_effect.IMAGES:
+        size = min(layers.size, _LARGEST_WRINKLES)
+        key = key_of(face.motion_digest, name, size, _PADDING)
+        return cache.get(key, lambda: _wrinkles(face, size, wrinkles_effect.IMAGES.index(name)))
     return None
+
+
+def strain_coefficients(face: Surface, cache: MapCache | None = None) -> np.ndarray:
+    """(2, C, K) by which keys drive the maps of strain in the left and the right half of the face."""
+    key = key_of(face.motion_digest, "strain coefficients")
+    return (cache or MapCache()).get(key, lambda: face.moving.area.coefficients)
+
+
+def wrinkle_coefficients(face: Surface, cache: MapCache | None = None) -> np.ndarray:
+    """(2, C, K) by which keys drive the maps of wrinkles, below 0 counting as 0."""
+    key = key_of(face.motion_digest, "wrinkle coefficients")
+    return (cache or MapCache()).get(key, lambda: face.moving.welded_folds.coefficients)
+
+
+def _components(face: Surface, size: int, values: np.ndarray, image: int) -> np.ndarray:
+    """Four components (of values (C, V)) in one image, (size, size, 4)."""
+    return _draw(face, size, values[4 * image : 4 * image + 4].T, np.zeros(4, dtype=np.float32))
+
+
+def _wrinkles(face: Surface, size: int, image: int) -> np.ndarray:
+    """Heights in mm of four fold patterns, (size, size, 4)."""
+    depth, phase = face.furrows
+    four = slice(4 * image, 4 * image + 4)
+    drawn = _draw(face, size, np.vstack([face.position_mm.T, depth[four], phase[four]]).T, np.zeros(11, dtype=np.float32))
+    heights = np.zeros((size, size, 4), dtype=np.float32)
+    for i in range(4):
+        at = drawn[..., 3 + i] > 0.0
+        heights[at, i] = wrinkles.furrow_height_mm(
+            drawn[at, 3 + i], drawn[at, 7 + i], drawn[at, :3], seed=4 * image + i
+        )
+    return heights
 
 
 def _masks(face: Surface, size: int, regions: tuple[str, ...]) -> np.ndarray:

@@ -11,7 +11,7 @@ from .albedo import read_picture
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
-from .surface import face_regions, find_face_regions
+from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
 
 
 def active_face(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -39,6 +39,8 @@ def live_plan(face: bpy.types.Object) -> Plan:
             live=True,
             maps=map_ranges_of(face),
             growth=growth_of(face),
+            shape_keys=has_shape_keys(face),
+            pressure=has_pressure(face),
         ),
         quality_of(face),
     )

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-from ..app.maps import Surface, bake_maps
+from ..app.maps import Surface, bake_maps, strain_coefficients, wrinkle_coefficients
 from ..domain.blood import BLOOD_CHANNELS
+from ..domain.effects import strain, wrinkles
 from ..domain.errors import InputError
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
@@ -15,6 +16,7 @@ from ..domain.udim import FIRST_TILE, check_tiles
 from .controls import drive_blood
 from .material import MARK, Map, build_skin_material, remove_skin_material
 from .properties import images_of
+from .strain import drive_components, remove_components
 from .surface import pixel_mm, read_surface, store_rest
 
 
@@ -30,7 +32,8 @@ def apply_skin(
 
     given: the maps that came with the face, by id; left out, those that its properties point to.
     """
-    maps = _maps(face, plan, images_of(face) if given is None else given, progress) if plan.maps else {}
+    surface = read_surface(face) if plan.maps else None
+    maps = _maps(face, surface, plan, images_of(face) if given is None else given, progress) if surface else {}
     before = face.material_slots[slot].material if face.material_slots else None
     if before is not None and MARK in before and before.users == 1:
         remove_skin_material(before)
@@ -44,14 +47,22 @@ def apply_skin(
         face.data.materials.append(material)
     if armature is not None:
         drive_blood(armature, face, [c for c in BLOOD_CHANNELS.values() if c.property_name in inputs])
+    remove_components(face)
+    if set(strain.IMAGES) & set(maps):
+        drive_components(face, strain.IMAGES, surface.keys.names, strain_coefficients(surface), one_sided=False)
+    if set(wrinkles.IMAGES) & set(maps):
+        drive_components(face, wrinkles.IMAGES, surface.keys.names, wrinkle_coefficients(surface), one_sided=True)
     return material
 
 
 def _maps(
-    face: bpy.types.Object, plan: Plan, given: Mapping[str, Map], progress: Callable[[int, int], bool] | None
+    face: bpy.types.Object,
+    surface: Surface,
+    plan: Plan,
+    given: Mapping[str, Map],
+    progress: Callable[[int, int], bool] | None,
 ) -> dict[str, Map]:
     """Map id -> image, or images by UDIM tile where the layout has more than the first."""
-    surface = read_surface(face)
     tiles = bake_maps(plan, surface, needed_sizes(face, surface, plan), progress=progress)
     maps: dict[str, Map] = {
         name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()

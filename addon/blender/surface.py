@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Vector
 
 from ..app.maps import Surface
+from ..domain.effects.pressure import ATTRIBUTE
 from ..domain.effects.regions import FACE_REGIONS
 from ..domain.errors import InputError
 from ..domain.facs import ARKIT
@@ -16,6 +17,7 @@ from ..domain.face_regions import find_regions
 from ..domain.head import load_regions
 from ..domain.head.model import ShapeKey
 from ..domain.resources import rigs_path
+from ..domain.strain import ShapeKeys
 
 GROUP_PREFIX = "sanguine_"
 REST_ATTRIBUTE = "rest_mm"
@@ -119,12 +121,43 @@ def read_surface(obj: bpy.types.Object) -> Surface:
     mesh.calc_loop_triangles()
     triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("loops", triangles)
-    regions = {region: _weights(obj, region) for region in face_regions(obj)}
-    return Surface(_position_mm(obj), uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions)
+    regions = {region: _group_weights(obj, GROUP_PREFIX + region) for region in face_regions(obj)}
+    return Surface(
+        _position_mm(obj), uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions, _shape_keys(obj)
+    )
 
 
-def _weights(obj: bpy.types.Object, region: str) -> np.ndarray:
-    index = obj.vertex_groups[GROUP_PREFIX + region].index
+def has_shape_keys(obj: bpy.types.Object) -> bool:
+    """Whether keys that add up move the mesh (absolute keys, which follow one another, do not)."""
+    keys = obj.data.shape_keys
+    return keys is not None and keys.use_relative and any(not block.mute for block in keys.key_blocks[1:])
+
+
+def _shape_keys(obj: bpy.types.Object) -> ShapeKeys | None:
+    """What each key moves at value 1, at the object's scale; keys that move nothing, or are muted, are left out."""
+    if not has_shape_keys(obj):
+        return None
+    names, deltas = [], []
+    for block in obj.data.shape_keys.key_blocks[1:]:
+        delta = _key_positions(block) - _key_positions(block.relative_key)
+        if block.vertex_group in obj.vertex_groups:
+            delta *= _group_weights(obj, block.vertex_group)[:, None]
+        if not block.mute and delta.any():
+            names.append(block.name)
+            deltas.append(delta * _position_scale_mm(obj))
+    return ShapeKeys(tuple(names), np.float32(deltas)) if names else None
+
+
+def has_pressure(obj: bpy.types.Object) -> bool:
+    """Whether the mesh says where something presses on it: itself, or after its modifiers."""
+    if ATTRIBUTE in obj.vertex_groups or ATTRIBUTE in obj.data.attributes:
+        return True
+    depsgraph = bpy.context.view_layer.depsgraph  # as it stands: panels ask while they draw
+    return depsgraph is not None and ATTRIBUTE in getattr(obj.evaluated_get(depsgraph).data, "attributes", ())
+
+
+def _group_weights(obj: bpy.types.Object, group: str) -> np.ndarray:
+    index = obj.vertex_groups[group].index
     weights = np.zeros(len(obj.data.vertices), dtype=np.float32)
     for vertex in obj.data.vertices:
         for element in vertex.groups:

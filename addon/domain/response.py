@@ -34,9 +34,9 @@ class Response:
         for weight, operand in self.terms:
             name = operand.expression() if isinstance(operand, Response) else operand
             sign = "-" if weight < 0 else "+" if total else ""
-            total += sign + (name if abs(weight) == 1 else f"{_number(abs(weight))}*{name}")
+            total += sign + (name if abs(weight) == 1 else f"{number_text(abs(weight))}*{name}")
         # clamp() without limits is 0 to 1: worth its brevity, as Blender cuts a driver at 255 characters.
-        limits = "" if (self.low, self.high) == (0.0, 1.0) else f",{_number(self.low)},{_number(self.high)}"
+        limits = "" if (self.low, self.high) == (0.0, 1.0) else f",{number_text(self.low)},{number_text(self.high)}"
         return (f"{self.gain}*" if self.gain else "") + f"clamp({total}{limits})"
 
     def controls(self) -> tuple[str, ...]:
@@ -47,6 +47,6 @@ class Response:
         return tuple(dict.fromkeys(names))
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """Shortest decimal text, without the exponent that Blender's own parser might not read."""
     return f"{value:.9f}".rstrip("0").rstrip(".")

@@ -329,7 +329,8 @@ def scene_of(
             continue
         pose = pose_of(shot, job)
         emotions = {name: value for name, value in pose.emotions.items() if value > 0.0}
-        frames.append(Frame(job.id, emotions, pose.blood))
+        moves = bool(emotions) or any(value > 0.0 for value in pose.action_units.values())
+        frames.append(Frame(job.id, emotions, pose.blood, moves))
     return Scene(
         skin=subject.whole_skin(),
         frames=tuple(frames),

@@ -11,6 +11,7 @@ void bind_inversion(nb::module_& m);
 void bind_mesh(nb::module_& m);
 void bind_optics(nb::module_& m);
 void bind_solve(nb::module_& m);
+void bind_strain(nb::module_& m);
 void bind_texture(nb::module_& m);
 
 NB_MODULE(_core, m) {
@@ -21,6 +22,7 @@ NB_MODULE(_core, m) {
     bind_optics(m);
     bind_solve(m);
     bind_bench(m);
+    bind_strain(m);
     bind_texture(m);
     bind_mesh(m);
     m.def(

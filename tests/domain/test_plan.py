@@ -1,5 +1,6 @@
 """The planner: only what the scene calls for, and the reason why."""
 
+import math
 import re
 
 import pytest
@@ -10,6 +11,7 @@ from sanguine.domain.facs import EMOTION_CONTROLS
 from sanguine.domain.parameters import PARAMETERS, default_skin
 from sanguine.domain.plan import check_strengths, make_plan
 from sanguine.domain.shader import assemble
+from sanguine.domain.strain import HIGH, LOW
 
 REGIONS = tuple(ANATOMY)
 
@@ -117,3 +119,30 @@ def test_live_axes_reach_as_far_as_the_sliders():
 def test_unknown_strength_is_an_error_with_a_hint():
     with pytest.raises(InputError, match="relief"):
         check_strengths({"releif": 1.0}, "shot.toml: effects")
+
+
+def test_strain_and_wrinkles_run_where_shape_keys_move():
+    asked = {"strain": 1.0, "wrinkles": 1.0}
+    still = dict(skin=default_skin(), strengths=check_strengths(asked, "test"), regions=REGIONS)
+    happy, neutral = Frame("happy", {"happy": 1.0}), Frame("neutral", moves=False)
+    plan = make_plan(Scene(frames=(neutral, happy), **still))
+    assert {"strain", "wrinkles"} <= active(plan)
+    assert plan.decisions["strain"].frames == ("happy",)
+    assert not active(make_plan(Scene(frames=(neutral,), **still))) & set(asked)
+    assert not active(make_plan(Scene(frames=(happy,), shape_keys=False, **still))) & set(asked)
+    off = make_plan(scene(frames=({"happy": 1.0},)))
+    assert not [name for name in off.maps if name.startswith(("strain", "wrinkles"))]
+    assert off.decisions["strain"].because == "its strength is 0"
+
+
+def test_strain_and_pressure_widen_the_axis_of_blood_and_nothing_else():
+    def axes(**given):
+        return {a.id: (a.low, a.high) for a in make_plan(Scene(default_skin(), (Frame("a"),), **given)).axes}
+
+    assert axes() == {}
+    blood = default_skin()["hemoglobin"]
+    strained = axes(strengths=check_strengths({"strain": 1.0, "anatomy": 0.0}, "test"))
+    assert strained == {"hemoglobin": pytest.approx((blood * math.exp(LOW), blood * math.exp(HIGH)))}
+    pressed = axes(strengths=check_strengths({"anatomy": 0.0}, "test"), pressure=True)
+    assert pressed == {"hemoglobin": pytest.approx((blood * 0.3, blood))}
+    assert axes(strengths=check_strengths({"anatomy": 0.0}, "test"), pressure=False) == {}

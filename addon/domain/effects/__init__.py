@@ -1,6 +1,9 @@
 """The effects, each declared in its module and listed here once, in the order in which they act."""
 
-from . import anatomy, grown, mottle, oil, oxygenation, perfusion, relief, residual, scattering, skin_map
+from . import (
+    anatomy, grown, mottle, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map, strain,
+    wrinkles,
+)
 from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
 EFFECTS: tuple[Effect, ...] = (
@@ -11,7 +14,10 @@ EFFECTS: tuple[Effect, ...] = (
     perfusion.EFFECT,
     oxygenation.EFFECT,
     mottle.EFFECT,  # after perfusion: a flush is blotchy too
+    strain.EFFECT,
+    pressure.EFFECT,
     relief.EFFECT,
+    wrinkles.EFFECT,
     residual.EFFECT,
     oil.EFFECT,  # after the residual: the film lies over brows and make-up too
 )

@@ -27,6 +27,8 @@ class Frame:
     id: str
     emotions: Mapping[str, float] = field(default_factory=dict)
     blood: float = 1.0
+    # False when neither an emotion nor an action unit moves the face.
+    moves: bool = True
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,9 @@ class Scene:
     # Maps that came with the face (from a picture, from elsewhere): map id -> chromophore that it holds -> the range
     # over its texels.
     maps: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
+    # Whether the face has shape keys, by which it moves, and a vertex group (or attribute) of outer pressure.
+    shape_keys: bool = True
+    pressure: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,8 @@ class ShaderInput:
     """One input of the assembled shader and where its value comes from.
 
     source: "parameter" (a schema id, a slider of the node group), "strength" (the effect's own slider),
-    "object" (a custom property of the object), "vertex" (an attribute of the mesh), "map" (a packed image,
+    "object" (a custom property of the object, "object:color" and "object:alpha" the first three and the fourth of its
+    numbers), "vertex" (an attribute of the mesh, "vertex:weight" a single number of it), "map" (a packed image,
     "map:alpha" its alpha channel), "chromophores" (an output of the first shader, for inputs of the second).
     """
 

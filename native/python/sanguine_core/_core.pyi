@@ -292,6 +292,41 @@ def multipole(layers: Annotated[NDArray[numpy.float64], dict(shape=(None, 5), or
     enters the stack. May be negative. terms: N for the dipoles -N to N of a layer, -1 for their closed sum.
     """
 
+def surface_strain(position: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], displacements: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], measure: str = 'log') -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]:
+    """
+    Strain of a surface whose vertices move, one result per row of displacements.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, at rest
+    triangles : (T, 3) int32, indices of vertices
+    displacements : (K, V, 3) float32, in the same unit
+    measure : "log" (Hencky, exact; trace = logarithm of the ratio of areas) or "linear" (infinitesimal; sums of
+        displacements give sums of strains)
+
+    Returns
+    -------
+    (K, V, 6) float32: xx, yy, zz, xy, xz, yz of a symmetric tensor in the tangent plane at rest. Always finite: stretches
+    count as 0.05 at least and 20 at most, and triangles without area take no part.
+    """
+
+def vertex_areas(position: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None,))]:
+    """
+    Area that each vertex stands for, (V,) float32: a third of its triangles'.
+    """
+
+def stripe_phase(position: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], across: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], weight: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float32], dict(shape=(None,))]:
+    """
+    Phase in cycles, (V,) float32, whose gradient follows `across` as nearly as one function can.
+
+    Parameters
+    ----------
+    position : (V, 3) float32
+    triangles : (T, 3) int32, indices of vertices
+    across : (V, 3) float32, direction across the stripes times cycles per unit length; its sign carries no meaning
+    weight : (V,) float32, 0 or more: how much each direction counts
+    """
+
 class ImageError(OSError):
     pass
 

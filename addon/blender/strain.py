@@ -1,0 +1,99 @@
+"""Drivers from shape keys to the components of strain and wrinkles: custom properties that the material reads.
+
+Each property holds four numbers, the components of one image in one half of the face. The drivers are simple
+expressions that listen to the keys' values, whatever moves these (keyframes, drivers, capture), so a file with them
+works without the add-on and with auto-run off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ..domain.effects.strain import HALVES
+from ..domain.effects import strain, wrinkles
+from ..domain.key_sums import KeySum, key_sums
+
+# Coefficients below this share of a component are left out: together they move no map by as much as its rounding.
+LEAST = 0.004
+_PART = "_part"
+
+
+def drive_components(
+    face: bpy.types.Object, images: Sequence[str], keys: Sequence[str], coefficients: np.ndarray, one_sided: bool
+) -> None:
+    """Puts the driven properties `<image>_left` and `<image>_right` on `face`.
+
+    coefficients: (2, C, K), four components per image. one_sided: what is below 0 counts as 0. A sum too long for one
+    driver is taken in parts, each a property of its own.
+    """
+    for half, name in enumerate(HALVES):
+        for i, image in enumerate(images):
+            rows = coefficients[half, 4 * i : 4 * i + 4]
+            sums = [key_sums({k: c for k, c in zip(keys, row, strict=True) if abs(c) >= LEAST}) for row in rows]
+            _drive_property(face, f"{image}_{name}", sums, one_sided)
+
+
+def remove_components(face: bpy.types.Object) -> None:
+    """Removes the properties of `drive_components` and their drivers."""
+    for image in (*strain.IMAGES, *wrinkles.IMAGES):
+        for half in HALVES:
+            for name in [key for key in face.keys() if key == f"{image}_{half}" or key.startswith(f"{image}_{half}{_PART}")]:
+                face.driver_remove(f'["{name}"]', -1)
+                del face[name]
+
+
+def _drive_property(face: bpy.types.Object, name: str, sums: list[list[KeySum]], one_sided: bool) -> None:
+    face[name] = [0.0] * len(sums)
+    _describe(face, name)
+    parts = max(map(len, sums), default=0)
+    for part in range(parts if parts > 1 else 0):
+        face[f"{name}{_PART}{part}"] = [0.0] * len(sums)
+        _describe(face, f"{name}{_PART}{part}")
+    for i, several in enumerate(sums):
+        if not several:
+            continue
+        if len(several) == 1:
+            expression = f"max(0,{several[0].expression})" if one_sided else several[0].expression
+            if len(expression) < 255:
+                _drive(face, name, i, expression, {v: _value_of(face, key) for v, key in several[0].keys.items()})
+                continue
+        chain = {}
+        for part, one in enumerate(several):
+            part_name = f"{name}{_PART}{part}"
+            if part_name not in face:
+                face[part_name] = [0.0] * len(sums)
+                _describe(face, part_name)
+            _drive(face, part_name, i, one.expression, {v: _value_of(face, key) for v, key in one.keys.items()})
+            chain[f"s{part}"] = ("OBJECT", face, f'["{part_name}"][{i}]')
+        total = "+".join(chain)
+        _drive(face, name, i, f"max(0,{total})" if one_sided else total, chain)
+
+
+Target = tuple[str, bpy.types.ID, str]
+
+
+def _value_of(face: bpy.types.Object, key: str) -> Target:
+    return "KEY", face.data.shape_keys, f'key_blocks["{bpy.utils.escape_identifier(key)}"].value'
+
+
+def _drive(face: bpy.types.Object, name: str, index: int, expression: str, variables: dict[str, Target]) -> None:
+    curve = face.driver_add(f'["{name}"]', index)
+    curve.keyframe_points.clear()  # the default curve is an identity that rounds; without keys the value passes as it is
+    driver = curve.driver
+    driver.type = "SCRIPTED"
+    for variable, (kind, owner, path) in variables.items():
+        made = driver.variables.new()
+        made.name = variable
+        made.targets[0].id_type = kind
+        made.targets[0].id = owner
+        made.targets[0].data_path = path
+    driver.expression = expression
+    if not (driver.is_valid and driver.is_simple_expression):
+        raise ValueError(f"{name}[{index}]: Blender does not take this as a simple expression: {expression}")
+
+
+def _describe(face: bpy.types.Object, name: str) -> None:
+    face.id_properties_ui(name).update(description="How far the shape keys drive the maps of strain or wrinkles")
