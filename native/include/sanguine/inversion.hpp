@@ -109,7 +109,7 @@ private:
     int cell_, columns_, rows_;                ///< texels per side of a cell; cells
     std::vector<std::int64_t> sums_;           ///< [cell][4]: linear RGB times alpha, alpha; fixed point
     int step_x_, step_y_, sample_columns_, sample_rows_;
-    std::vector<float> samples_;               ///< [sample row][3 rows][sample column][3 columns][3]: cube root of RGB
+    std::vector<float> samples_;               ///< [sample row][7 rows][sample column][7 columns][3]: cube root of RGB
 };
 
 enum class Shading { off, automatic, on };
@@ -124,7 +124,7 @@ struct InversionOptions {
 struct PictureModel {
     int width, height;
     std::array<std::array<float, 3>, 3> noise;  ///< lower Cholesky factor of its covariance in L*a*b*
-    double noise_sd;                            ///< mean over L*, a*, b*
+    double noise_sd;                            ///< mean over L*, a*, b*; 0: too little to be filtered
     SkinPoint centre, spread;                   ///< median and robust standard deviation of the skin's estimates
     double skin_share;                          ///< of the overview
     double shading_found, shading_pigment;      ///< standard deviation of ln shading: found, and what pigment may feign

@@ -277,7 +277,7 @@ public:
                 const Vec there = lab(next);
                 const double then = cost(next, there, target);
                 if (then < now) {
-                    better = now - then > 1e-9 * now + 1e-12;
+                    better = now - then > 1e-5 * now + 1e-6;  // a cost of 1 is a step of inversion_model_sd
                     u = next, seen = there, now = then;
                     damping = std::max(damping / 8, 1e-9);
                     break;
@@ -464,12 +464,12 @@ MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double nois
     // alone could be skin. Melanin is judged by what is near, because light and sun change slowly over a face.
     MaskRule r;
     r.centre[0] = centre[0], r.centre[1] = centre[1];
-    r.above[0] = std::clamp(3 * spread[0], 1.2f, 1.6f);
+    r.above[0] = std::clamp(3.5f * spread[0], 1.7f, 2.0f);
     r.below[0] = std::clamp(3 * spread[0], 1.0f, 1.6f);
-    r.above[1] = std::clamp(3.5f * spread[1], 1.9f, 2.5f);
+    r.above[1] = std::clamp(3.5f * spread[1], 2.3f, 2.6f);
     r.below[1] = std::clamp(3.5f * spread[1], 1.4f, 1.8f);
-    r.above_near = 1.3f;
-    r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.3f, 1.5f);
+    r.above_near = 1.5f;
+    r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.5f, 1.7f);
     r.error_free = float(3 + 2 * noise_sd);
     return r;
 }
@@ -686,7 +686,8 @@ std::array<float, 3> SkinInverse::rgb_of_lab(const std::array<float, 3>& lab) co
 
 namespace {
 constexpr int overview_side = 256;
-constexpr int sample_side = 224;
+constexpr int sample_side = 128;
+constexpr int noise_window = 7;
 constexpr double sum_unit = 1 << 24;  ///< of the sums over a cell
 constexpr double sum_limit = 1e7;     ///< of one row of a cell: 65536 rows of it fit into the integers
 }  // namespace
@@ -700,11 +701,11 @@ PictureOverview::PictureOverview(int width, int height) : width_(width), height_
     rows_ = (height + cell_ - 1) / cell_;
     added_.assign(height, 0);
     sums_.resize(std::size_t(columns_) * rows_ * 4);
-    step_x_ = std::max(3, width / sample_side);
-    step_y_ = std::max(3, height / sample_side);
+    step_x_ = std::max(noise_window, width / sample_side);
+    step_y_ = std::max(noise_window, height / sample_side);
     sample_columns_ = width / step_x_;
     sample_rows_ = height / step_y_;
-    samples_.assign(std::size_t(sample_rows_) * sample_columns_ * 27, std::numeric_limits<float>::quiet_NaN());
+    samples_.assign(std::size_t(sample_rows_) * sample_columns_ * noise_window * noise_window * 3, std::numeric_limits<float>::quiet_NaN());
 }
 
 void PictureOverview::add(const PictureRows& in, int threads) {
@@ -748,10 +749,11 @@ void PictureOverview::add(const PictureRows& in, int threads) {
                     sums_[(std::size_t(row) * columns_ + column) * 4 + c] += std::llround(std::min(sum[c], sum_limit) * sum_unit);
             }
             const int sample = y / step_y_, within = y % step_y_;
-            if (within < 3 && sample < sample_rows_)
+            if (within < noise_window && sample < sample_rows_)
                 for (int s = 0; s < sample_columns_; ++s)
-                    for (int x = 0; x < 3; ++x) {
-                        float* out = &samples_[((std::size_t(sample) * 3 + within) * sample_columns_ * 3 + s * 3 + x) * 3];
+                    for (int x = 0; x < noise_window; ++x) {
+                        const std::size_t line = std::size_t(sample) * noise_window + within;
+                        float* out = &samples_[((line * sample_columns_ + s) * noise_window + x) * 3];
                         const int at = s * step_x_ + x;
                         if (at < width_ && alpha[at] > 0.5f) {
                             out[0] = cube_root(r[at]);
@@ -1043,36 +1045,45 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
     double sd = 0;  // in cube roots
     const MaskRule rule = mask_rule(centre, spread, 0);
     if (options.noise < 0) {
-        std::vector<float> responses;
+        // Next to each other and further apart: what JPEG leaves of colour has steps of two texels.
+        constexpr int spacings = 3, middle = noise_window / 2;
+        std::vector<float> responses[spacings];
         for (const PictureOverview* o : overviews) {
-            const int across = o->sample_columns_ * 3;
+            const std::size_t across = std::size_t(o->sample_columns_) * noise_window;
             for (int s = 0; s < o->sample_rows_; ++s)
                 for (int q = 0; q < o->sample_columns_; ++q) {
-                    const auto at = [&](int y, int x) { return &o->samples_[((std::size_t(s) * 3 + y) * across + q * 3 + x) * 3]; };
-                    std::array<float, 3> middle;
+                    const auto at = [&](int y, int x) {
+                        return &o->samples_[((std::size_t(s) * noise_window + y) * across + q * noise_window + x) * 3];
+                    };
+                    std::array<float, 3> rgb;
                     for (int c = 0; c < 3; ++c)
-                        middle[c] = at(1, 1)[c] * at(1, 1)[c] * at(1, 1)[c];
-                    // Immerkaer 1996, Comput. Vis. Image Underst. 64:300: blind to planes and edges along the axes.
-                    constexpr double mask[3] = {1, -2, 1};
-                    double response = 0;
-                    for (int y = 0; y < 3; ++y)
-                        for (int x = 0; x < 3; ++x)
-                            for (int c = 0; c < 3; ++c)
-                                response += normal[c] * mask[y] * mask[x] * at(y, x)[c];
-                    if (!std::isfinite(response))
+                        rgb[c] = std::pow(at(middle, middle)[c], 3.0f);
+                    if (!std::isfinite(rgb[0] + rgb[1] + rgb[2]))
                         continue;
-                    const auto seen = inverse.lab_of_rgb(middle);
+                    const auto seen = inverse.lab_of_rgb(rgb);
                     const SkinPoint p = inverse.point(seen);
                     const auto back = inverse.lab(p);
                     float error = 0;
                     for (int k = 0; k < 3; ++k)
                         error += (seen[k] - back[k]) * (seen[k] - back[k]);
-                    if (distance_from_skin(rule, p[0], p[1], p[0], error) < 1.4f)
-                        responses.push_back(float(std::abs(response) / 6));
+                    if (!(distance_from_skin(rule, p[0], p[1], p[0], error) < 1.4f))
+                        continue;
+                    for (int d = 1; d <= spacings; ++d) {
+                        // Immerkaer 1996, Comput. Vis. Image Underst. 64:300: blind to planes and edges along the axes.
+                        constexpr double mask[3] = {1, -2, 1};
+                        double response = 0;
+                        for (int y = 0; y < 3; ++y)
+                            for (int x = 0; x < 3; ++x)
+                                for (int c = 0; c < 3; ++c)
+                                    response += normal[c] * mask[y] * mask[x] * at(middle + (y - 1) * d, middle + (x - 1) * d)[c];
+                        if (std::isfinite(response))
+                            responses[d - 1].push_back(float(std::abs(response) / 6));
+                    }
                 }
         }
-        if (responses.size() >= 64)
-            sd = 1.4826 * median_of(responses);
+        for (std::vector<float>& r : responses)
+            if (r.size() >= 64)
+                sd = std::max(sd, 1.4826 * median_of(r));
         // Rounding to the steps of the file is uniform over a step; flat areas hide it.
         if (options.quantum > 0) {
             const double value = std::pow(root[1], 3);
@@ -1091,7 +1102,11 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
             else
                 for (int c = 0; c < 3; ++c)
                     covariance[i][j] += sd * sd * lab_by_root[i][c] * lab_by_root[j][c];
-    const double noise_sd = std::sqrt((covariance[0][0] + covariance[1][1] + covariance[2][2]) / 3);
+    // What is below the tables' own error is not worth a filter.
+    constexpr double least_noise = 0.02;
+    double noise_sd = std::sqrt((covariance[0][0] + covariance[1][1] + covariance[2][2]) / 3);
+    if (noise_sd < least_noise)
+        noise_sd = 0, covariance = {};
     Matrix3f factor{};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j) {
@@ -1314,11 +1329,16 @@ void mask_row(int n, const MaskRule& rule, const TileRow& row, Tile& tile) {
     }
 }
 
+/// What is more likely skin than not keeps its own estimate, what is surely none takes that of the skin around.
+constexpr float surely_none = 0.25f, likely_skin = 0.65f;
+
 SANGUINE_VECTOR_CLONES
 void blend_row(int n, Tile& tile) {
     for (int k = 0; k < 3; ++k)
-        for (int i = 0; i < n; ++i)
-            tile.point[k][i] = tile.fill[k][i] + tile.mask[i] * (tile.point[k][i] - tile.fill[k][i]);
+        for (int i = 0; i < n; ++i) {
+            const float own = limit((tile.mask[i] - surely_none) * (1 / (likely_skin - surely_none)), 0, 1);
+            tile.point[k][i] = tile.fill[k][i] + own * (tile.point[k][i] - tile.fill[k][i]);
+        }
 }
 
 SANGUINE_VECTOR_CLONES
@@ -1429,7 +1449,7 @@ InversionCounts invert_rows(const SkinInverse& inverse, const PictureModel& mode
             look_row(0, n, forward, scale, tile);
             upsample_inner.read(model.near, 1, 0, y, tile.near);
             mask_row(n, rule, row, tile);
-            if (std::any_of(tile.mask, tile.mask + n, [](float m) { return m < 1; })) {
+            if (std::any_of(tile.mask, tile.mask + n, [](float m) { return m < likely_skin; })) {
                 for (int k = 0; k < 3; ++k)
                     upsample_inner.read(model.fill, 3, k, y, tile.fill[k]);
                 blend_row(n, tile);
