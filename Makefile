@@ -55,6 +55,7 @@ soak: setup $(TEST_STAMP) ## Look for stacks and skins that break the optics, fo
 bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour, on an idle machine)
 	$(VENV)/bin/sanguine bench accuracy
 	$(PY) bench/measured_skin.py
+	$(PY) bench/inversion.py
 	$(PY) bench/picture.py
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing

@@ -132,7 +132,7 @@ struct PictureModel {
     double exposure;                            ///< ln of a factor on the whole picture that is in the shading
     int columns, rows, cell;                    ///< of the overview
     std::vector<float> shading;                 ///< [row][column] factor on the light; empty: 1 everywhere
-    std::vector<float> near;                    ///< [row][column] ln melanin of the skin around
+    std::vector<float> near;                    ///< [row][column][2] ln melanin of the skin around, and of all in a small patch
     std::vector<float> fill;                    ///< [row][column][3] SkinPoint for what is not skin
 };
 

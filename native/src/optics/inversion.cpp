@@ -455,13 +455,14 @@ SANGUINE_INLINE void inverse_with_variance(const InverseTable& t, const std::arr
 
 /// The soft ends of what counts as this picture's skin.
 struct MaskRule {
-    float centre[2], above[2], below[2], above_near, hair, error_free;
+    float centre[2], above[2], below[2], above_near, above_patch, hair, error_free;
 };
 
 MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double noise_sd) {
     // Freckles have up to four times the melanin of the skin around (features/freckles.cpp), lips 4.5 times its blood
     // (rigs/anatomy.toml): both have to pass. Hair has more melanin and no blood: together these tell it even where either
-    // alone could be skin. Melanin is judged by what is near, because light and sun change slowly over a face.
+    // alone could be skin. Melanin is judged by what is near, because light and sun change slowly over a face; and by the mean
+    // over a patch, because freckles are small and brows are not.
     MaskRule r;
     r.centre[0] = centre[0], r.centre[1] = centre[1];
     r.above[0] = std::clamp(3.5f * spread[0], 1.7f, 2.0f);
@@ -469,22 +470,25 @@ MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double nois
     r.above[1] = std::clamp(3.5f * spread[1], 2.3f, 2.6f);
     r.below[1] = std::clamp(3.5f * spread[1], 1.4f, 1.8f);
     r.above_near = 1.5f;
+    r.above_patch = 0.42f;
     r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.5f, 1.7f);
     r.error_free = float(3 + 2 * noise_sd);
     return r;
 }
 
 /// Squared distance from skin, 0 for all that counts as skin.
-SANGUINE_INLINE float distance_from_skin(const MaskRule& r, float m, float h, float m_near, float lab_error_squared) {
+SANGUINE_INLINE float distance_from_skin(const MaskRule& r, float m, float h, float m_near, float m_patch,
+                                         float lab_error_squared) {
     const float dm = m - r.centre[0], dh = h - r.centre[1], dn = m - m_near;
     const auto beyond = [](float d, float end) { return d > end ? (d - end) * (1 / 0.35f) : 0.0f; };
     const float pm = beyond(dm, r.above[0]) + beyond(-dm, r.below[0]);
     const float ph = beyond(dh, r.above[1]) + beyond(-dh, r.below[1]);
     const float near = beyond(dn, r.above_near);
+    const float patch = dn > 0.4f ? beyond(m_patch - m_near, r.above_patch) : 0.0f;
     const float hair = dn > 0.4f ? beyond(dn - dh, r.hair) : 0.0f;
     const float e = std::sqrt(lab_error_squared) - r.error_free;
     const float pe = e > 0 ? e * (1.0f / 3) : 0.0f;
-    return pm * pm + ph * ph + near * near + hair * hair + pe * pe;
+    return pm * pm + ph * ph + near * near + patch * patch + hair * hair + pe * pe;
 }
 
 // ---- Colour difference
@@ -781,7 +785,7 @@ struct Cells {
     std::vector<float> there;               ///< share of the cell
     std::vector<SkinPoint> point;
     std::vector<float> error, mask;         ///< squared distance in Lab; probability of skin
-    std::vector<float> near;                ///< ln melanin of the skin around
+    std::vector<float> near;                ///< [2]: ln melanin of the skin around, and of the patch around
     std::vector<float> shade, sure;         ///< ln of the light, and how sure
 };
 
@@ -894,7 +898,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
         cells[t].rgb.assign(count, {});
         cells[t].there.resize(count);
         cells[t].shade.assign(count, 0);
-        cells[t].near.assign(count, usual[0]);
+        cells[t].near.assign(2 * count, usual[0]);
         for (std::size_t i = 0; i < count; ++i) {
             const int x = int(i % o.columns_) * o.cell_, y = int(i / o.columns_) * o.cell_;
             const double area = double(std::min(o.cell_, o.width_ - x)) * std::min(o.cell_, o.height_ - y);
@@ -914,6 +918,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
     bool first_look = true;
     // A share of the longer side: broader than a brow or a lip is high. A guess.
     const auto low_pass_sigma = [](const PictureOverview& o) { return std::max(1.0, 0.07 * std::max(o.columns_, o.rows_)); };
+    constexpr double patch_share = 0.012;  // broader than freckles, narrower than a brow is long: a guess
     const Search lit_search(inverse.forward_.data(), true);
     const auto look = [&](double noise_sd, bool lit) {
         for (std::size_t t = 0; t < cells.size(); ++t) {
@@ -963,7 +968,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     rule.centre[k] = usual[k];
                     rule.above[k] = rule.below[k] = 2 * float(axes[k].sd);
                 }
-                rule.above_near = rule.hair = 4;
+                rule.above_near = rule.above_patch = rule.hair = 4;
                 first_look = false;
             }
             std::vector<float> values[3];
@@ -971,7 +976,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
             for (Cells& c : cells)
                 for (std::size_t i = 0; i < c.rgb.size(); ++i) {
                     there += c.there[i];
-                    const float far = distance_from_skin(rule, c.point[i][0], c.point[i][1], c.near[i], c.error[i]);
+                    const float far = distance_from_skin(rule, c.point[i][0], c.point[i][1], c.near[2 * i], c.near[2 * i + 1], c.error[i]);
                     c.mask[i] = exp_minus(0.5f * far) * c.there[i];
                     if (c.mask[i] > 0.5f)
                         for (int k = 0; k < 3; ++k)
@@ -996,9 +1001,13 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     melanin[i] = c.point[i][0] - centre[0];
                     weight[i] = c.mask[i] * c.mask[i];
                 }
-                c.near = low_pass(melanin, weight, o.columns_, o.rows_, low_pass_sigma(o), 0.003);
-                for (float& v : c.near)
-                    v += centre[0];
+                const std::vector<float> near = low_pass(melanin, weight, o.columns_, o.rows_, low_pass_sigma(o), 0.003);
+                const double patch_sigma = std::max(0.5, patch_share * std::max(o.columns_, o.rows_));
+                const std::vector<float> patch = low_pass(melanin, c.there, o.columns_, o.rows_, patch_sigma, 0.003);
+                for (std::size_t i = 0; i < near.size(); ++i) {
+                    c.near[2 * i] = near[i] + centre[0];
+                    c.near[2 * i + 1] = patch[i] + centre[0];
+                }
             }
         }
     };
@@ -1066,7 +1075,7 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                     float error = 0;
                     for (int k = 0; k < 3; ++k)
                         error += (seen[k] - back[k]) * (seen[k] - back[k]);
-                    if (!(distance_from_skin(rule, p[0], p[1], p[0], error) < 1.4f))
+                    if (!(distance_from_skin(rule, p[0], p[1], p[0], p[0], error) < 1.4f))
                         continue;
                     for (int d = 1; d <= spacings; ++d) {
                         // Immerkaer 1996, Comput. Vis. Image Underst. 64:300: blind to planes and edges along the axes.
@@ -1136,9 +1145,9 @@ std::vector<PictureModel> InversionKernel::models(const SkinInverse& inverse, st
                 }
         }
         const float middle = all.empty() ? 0 : median_of(all);
-        // Light on the whole picture is told from light skin only as far as it is more than the scattering of people differs
-        // (5 to 95 % of measured faces, docs/measured_skin.md, move the lightness of all colours by about as much).
-        constexpr double personal = 0.12;
+        // Light on the whole picture is told from light skin only as far as it is more than people differ: a scattering 30 %
+        // off, as 5 to 95 % of measured faces are (docs/measured_skin.md), feigns less than this.
+        constexpr double personal = 0.15;
         exposure = std::abs(middle) > personal ? middle * (1 - personal * personal / (double(middle) * middle)) : 0;
         double sum = 0, square = 0, weight = 0;
         for (std::size_t t = 0; t < cells.size(); ++t) {
@@ -1249,7 +1258,7 @@ struct TileRow {
 
 struct Tile {
     TileRow ring[window];
-    float near[tile_columns];  ///< ln melanin of the skin around
+    float near[tile_columns], patch[tile_columns];  ///< of the PictureModel
     float point[3][tile_columns], f[3][tile_columns], lab[3][tile_columns], mask[tile_columns], error[tile_columns];
     float fill[3][tile_columns], out[4][tile_columns];
 };
@@ -1324,7 +1333,7 @@ void mask_row(int n, const MaskRule& rule, const TileRow& row, Tile& tile) {
     for (int i = 0; i < n; ++i) {
         const float l = row.lab[0][i + halo] - tile.lab[0][i], a = row.lab[1][i + halo] - tile.lab[1][i];
         const float b = row.lab[2][i + halo] - tile.lab[2][i];
-        const float far = distance_from_skin(rule, tile.point[0][i], tile.point[1][i], tile.near[i], l * l + a * a + b * b);
+        const float far = distance_from_skin(rule, tile.point[0][i], tile.point[1][i], tile.near[i], tile.patch[i], l * l + a * a + b * b);
         tile.mask[i] = exp_minus(0.5f * far) * row.there[i + halo];
     }
 }
@@ -1447,7 +1456,8 @@ InversionCounts invert_rows(const SkinInverse& inverse, const PictureModel& mode
                     for (int i = 0; i < n; ++i)
                         tile.point[k][i] = row.point[k][i + halo] + model.centre[k];
             look_row(0, n, forward, scale, tile);
-            upsample_inner.read(model.near, 1, 0, y, tile.near);
+            upsample_inner.read(model.near, 2, 0, y, tile.near);
+            upsample_inner.read(model.near, 2, 1, y, tile.patch);
             mask_row(n, rule, row, tile);
             if (std::any_of(tile.mask, tile.mask + n, [](float m) { return m < likely_skin; })) {
                 for (int k = 0; k < 3; ++k)
