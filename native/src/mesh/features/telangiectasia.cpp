@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
 #include "random.hpp"
@@ -13,8 +14,8 @@
 namespace sanguine {
 namespace {
 
-constexpr float strongest = 2.2F;
-constexpr float contrast = 2.4F;        // of log_hemoglobin inside of a vessel: a guess by eye
+constexpr float strongest = 2.0F;
+constexpr float contrast = 2.1F;        // of log_hemoglobin inside of a vessel: a guess by eye
 constexpr float halo = 0.2F;           // share of it in the flush around: a guess
 constexpr float step_mm = 0.25F;
 constexpr float degree = 3.14159265F / 180;
@@ -31,16 +32,16 @@ float covered_share(const Person& person) {
 
 VesselHabit habit_of(const VesselTip&) {
     VesselHabit habit;
-    habit.spacing_mm = 0.7F;
-    habit.fork_every_mm = 2.2F;
+    habit.spacing_mm = 0.6F;
+    habit.fork_every_mm = 1.5F;
     habit.fork_angle = degree * 42;
     habit.fork_angle_spread = degree * 14;
-    habit.side_ratio = 0.8F;
+    habit.side_ratio = 0.75F;
     habit.yield = 0.4F;
     habit.wander_per_mm = 0.33F;
     habit.wander_length_mm = 0.9F;
-    habit.least_radius_mm = 0.05F;  // 0.1 mm is about the thinnest vessel that an eye tells from redness
-    habit.longest_mm = 9;
+    habit.least_radius_mm = 0.045F;  // 0.1 mm is about the thinnest vessel that an eye tells from redness
+    habit.longest_mm = 6;
     return habit;
 }
 
@@ -60,7 +61,7 @@ public:
             Random random(s.random);
             const glm::vec3 any(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
             const float lot = random.uniform(0, 1);
-            tree.plant(s.point, any, 0.07F + 0.12F * lot * lot);
+            tree.plant(s.point, any, 0.085F + 0.1F * lot * lot * lot);
             tree.grow();
             for (; counted < tree.segments().size(); ++counted)
                 covered_mm2 += 2 * tree.segments()[counted].radius_mm * step_mm;
@@ -112,7 +113,7 @@ private:
                 const glm::vec3 p = frame->standard(surface.position_mm()[v]);
                 wing = smooth_step(6, 13, std::abs(p.x)) * (1 - smooth_step(-30, -20, p.z));
             }
-            density[v] = 0.08F * (cheeks[v] * cheeks[v] + nose[v] * (0.25F + 10 * wing) + 0.12F * chin[v]);
+            density[v] = 0.2F * (cheeks[v] * cheeks[v] + nose[v] * (0.25F + 10 * wing) + 0.12F * chin[v]);
         }
         return density;
     }
@@ -120,29 +121,17 @@ private:
     VesselPaint vessels_, flush_;
 };
 
-class Telangiectasia final : public Feature {
-public:
-    const FeatureRow& row() const override {
-        static const FeatureRow row{
-            "telangiectasia",
-            "Telangiectasia",
-            "Fine red vessels of 0.1 to 0.4 mm at the wings of the nose and on the cheeks; more with age and sun",
-            "area covered: Hamer et al. (Rotterdam Study); age, sex: Mekic et al. 2020, J. Eur. Acad. Dermatol. "
-            "Venereol. 34:821; sun: Kennedy et al. 2003, J. Invest. Dermatol. 120:548; form and contrast are guesses",
-            {{LayerChannel::log_hemoglobin, 0, strongest}},
-        };
-        return row;
-    }
-    std::unique_ptr<const GrownFeature> grow(const SkinSurface& surface, const Person& person,
-                                             std::uint64_t seed) const override {
-        return std::make_unique<Grown>(surface, person, seed_for(seed, row().id));
-    }
-};
-
 }  // namespace
 
 const Feature& telangiectasia_feature() {
-    static const Telangiectasia feature;
+    static const FeatureOf<Grown> feature{{
+        "telangiectasia",
+        "Telangiectasia",
+        "Fine red vessels of 0.1 to 0.4 mm at the wings of the nose and on the cheeks; more with age and sun",
+        "area covered: Hamer et al. (Rotterdam Study); age, sex: Mekic et al. 2020, J. Eur. Acad. Dermatol. "
+        "Venereol. 34:821; sun: Kennedy et al. 2003, J. Invest. Dermatol. 120:548; form and contrast are guesses",
+        {{LayerChannel::log_hemoglobin, 0, strongest}},
+    }};
     return feature;
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feature_of.hpp"
 #include "list.hpp"
 #include "noise.hpp"
 #include "random.hpp"
@@ -38,9 +39,9 @@ constexpr Root roots[] = {
     {{27, -10, 14}, {0.35F, 0.3F, 1}, 0.5F, 55, 18, 0.9F, 0.08F},        // supraorbital
     {{69, 56, 2}, {-0.35F, -0.7F, 0.75F}, 0.85F, 95, 22, 0.8F, 0.28F},   // superficial temporal, frontal branch
     {{63, 28, 20}, {-0.6F, -0.8F, -0.5F}, 0.8F, 24, 11, 0.8F, 0.15F},    // sentinel
-    {{15, -9, -7}, {1, 0.2F, -0.25F}, 0.42F, 30, 7, 0.45F, 0},           // lower lid, from the inner corner
-    {{44, 4, -9}, {-1, -0.25F, -0.3F}, 0.42F, 24, 7, 0.45F, 0},          // lower lid, from the outer corner
-    {{18, -9, 7}, {1, 0.1F, 0.2F}, 0.27F, 24, 8, 0.5F, 0},               // upper lid
+    {{15, -9, -7}, {1, 0.35F, -0.08F}, 0.36F, 26, 7, 0.7F, 0},           // lower lid, from the inner corner
+    {{44, 4, -9}, {-1, -0.3F, -0.15F}, 0.36F, 22, 7, 0.7F, 0},          // lower lid, from the outer corner
+    {{18, -9, 7}, {1, 0.1F, 0.2F}, 0.3F, 24, 8, 0.6F, 0},               // upper lid
     {{14, -14, -5}, {0.3F, -0.1F, -1}, 0.45F, 42, 18, 1.1F, 0},          // angular, beside the nose
     {{57, 66, -84}, {-0.05F, -0.1F, -1}, 1.15F, 110, 45, 2.8F, 0.12F},   // external jugular
     {{13, 14, -112}, {0, 0.1F, -1}, 0.85F, 80, 35, 2.8F, 0.05F},          // anterior jugular
@@ -117,31 +118,19 @@ private:
     VesselPaint paint_;
 };
 
-class Veins final : public Feature {
-public:
-    const FeatureRow& row() const override {
-        static const FeatureRow row{
-            "veins",
-            "Veins",
-            "Bluish veins of 0.5 to 2 mm under thin skin: temple, forehead, lids, neck; needs the region 'eyelids'",
-            "diameters: Yang et al. 2015, Surg. Radiol. Anat. 37:175; why blue: Kienle et al. 1996, Appl. Opt. "
-            "35:1151; courses after anatomical atlases, contrast a guess",
-            {{LayerChannel::log_hemoglobin, 0, most_blood},
-             {LayerChannel::oxygenation, -most_oxygen, 0},
-             {LayerChannel::height_mm, 0, most_height_mm}},
-        };
-        return row;
-    }
-    std::unique_ptr<const GrownFeature> grow(const SkinSurface& surface, const Person& person,
-                                             std::uint64_t seed) const override {
-        return std::make_unique<Grown>(surface, person, seed_for(seed, row().id));
-    }
-};
-
 }  // namespace
 
 const Feature& veins_feature() {
-    static const Veins feature;
+    static const FeatureOf<Grown> feature{{
+        "veins",
+        "Veins",
+        "Bluish veins of 0.5 to 2 mm under thin skin: temple, forehead, lids, neck; needs the region 'eyelids'",
+        "diameters: Yang et al. 2015, Surg. Radiol. Anat. 37:175; why blue: Kienle et al. 1996, Appl. Opt. "
+        "35:1151; courses after anatomical atlases, contrast a guess",
+        {{LayerChannel::log_hemoglobin, 0, most_blood},
+         {LayerChannel::oxygenation, -most_oxygen, 0},
+         {LayerChannel::height_mm, 0, most_height_mm}},
+    }};
     return feature;
 }
 

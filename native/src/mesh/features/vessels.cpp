@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "feature_of.hpp"
 #include "features/vessels.hpp"
 #include "list.hpp"
 #include "noise.hpp"
@@ -194,7 +195,7 @@ VesselTree arteries_in(const SkinSurface& surface, const std::shared_ptr<const B
 
 class Grown final : public GrownFeature {
 public:
-    Grown(const SkinSurface& surface, std::uint64_t seed) {
+    Grown(const SkinSurface& surface, const Person&, std::uint64_t seed) {
         const auto beds = std::make_shared<const Beds>(surface);
         const VesselTree tree = arteries_in(surface, beds, seed);
         const Fbm depth{9, 2, 0.5F, std::uint32_t(seed)};
@@ -231,25 +232,6 @@ private:
     VesselPaint vessels_, fed_;
 };
 
-class Vessels final : public Feature {
-public:
-    const FeatureRow& row() const override {
-        static const FeatureRow row{
-            "vessels",
-            "Vessels",
-            "Trees of small arteries under the skin: fronds on forehead and nose, candelabra on cheek and jaw",
-            "patterns: Moretti 1959; Kalra and Magnenat-Thalmann 1994, Computer Animation '94:50; depth: Braverman "
-            "1997, Microcirculation 4:329; density, angles in degrees and contrast are guesses",
-            {{LayerChannel::log_hemoglobin, palest, strongest}, {LayerChannel::oxygenation, 0, most_oxygen}},
-        };
-        return row;
-    }
-    std::unique_ptr<const GrownFeature> grow(const SkinSurface& surface, const Person&,
-                                             std::uint64_t seed) const override {
-        return std::make_unique<Grown>(surface, seed_for(seed, row().id));
-    }
-};
-
 }  // namespace
 
 VesselTree facial_arteries(const SkinSurface& surface, std::uint64_t seed) {
@@ -257,7 +239,14 @@ VesselTree facial_arteries(const SkinSurface& surface, std::uint64_t seed) {
 }
 
 const Feature& vessels_feature() {
-    static const Vessels feature;
+    static const FeatureOf<Grown> feature{{
+        "vessels",
+        "Vessels",
+        "Trees of small arteries under the skin: fronds on forehead and nose, candelabra on cheek and jaw",
+        "patterns: Moretti 1959; Kalra and Magnenat-Thalmann 1994, Computer Animation '94:50; depth: Braverman "
+        "1997, Microcirculation 4:329; density, angles in degrees and contrast are guesses",
+        {{LayerChannel::log_hemoglobin, palest, strongest}, {LayerChannel::oxygenation, 0, most_oxygen}},
+    }};
     return feature;
 }
 
