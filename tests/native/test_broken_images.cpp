@@ -1,6 +1,7 @@
 // Files from anywhere: every reader gives an answer or one line that names the file, and takes no memory for what a
 // header merely promises. `make test` runs this under the address sanitizer as well.
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <bit>
@@ -237,6 +238,8 @@ TEST_F(BrokenImages, NothingAndSomethingElseAreRefused) {
     expect_refused_by_all(folder_ / "absent.null");  // OpenImageIO makes a picture up for these
     expect_refused_by_all(file("a.null", "x"));
     expect_refused_by_all("/dev/zero");
+    ASSERT_EQ(mkfifo((folder_ / "pipe.exr").c_str(), 0600), 0);
+    expect_refused_by_all(folder_ / "pipe.exr");  // and nobody waits for a writer
 }
 
 TEST_F(BrokenImages, AWrongMagicIsNoCrash) {

@@ -31,6 +31,7 @@ namespace fs = std::filesystem;
 class HeaderReader {
 public:
     explicit HeaderReader(const fs::path& path) : path_(path) {
+        check_is_file(path);
         exr_context_initializer_t settings = EXR_DEFAULT_CONTEXT_INITIALIZER;
         settings.max_image_width = max_image_side;
         settings.max_image_height = max_image_side;

@@ -8,12 +8,15 @@
 
 namespace sanguine {
 
-std::unique_ptr<OIIO::ImageInput> open_checked(const std::filesystem::path& path) {
-    // Some of OpenImageIO's readers need no file: a name that ends in .null makes a picture up.
+void check_is_file(const std::filesystem::path& path) {
     std::error_code error;
     const auto kind = std::filesystem::status(path, error).type();
     if (kind == std::filesystem::file_type::not_found) throw ImageError(path, "no such file");
     if (kind != std::filesystem::file_type::regular) throw ImageError(path, "cannot be read: it is no ordinary file");
+}
+
+std::unique_ptr<OIIO::ImageInput> open_checked(const std::filesystem::path& path) {
+    check_is_file(path);
     OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1);
     auto input = OIIO::ImageInput::open(path.string(), &config);

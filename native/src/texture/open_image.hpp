@@ -9,6 +9,10 @@
 
 namespace sanguine {
 
+/// Throws ImageError for a name without a file, of which some of OpenImageIO's readers make a picture up, and for what
+/// would keep a reader waiting (a pipe, a device).
+void check_is_file(const std::filesystem::path& path);
+
 /// The first subimage, alpha as the file has it. Throws ImageError for what is no flat picture within the limits.
 std::unique_ptr<OIIO::ImageInput> open_checked(const std::filesystem::path& path);
 
