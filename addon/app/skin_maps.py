@@ -12,12 +12,11 @@ import numpy as np
 import sanguine_core
 
 from ..domain.effects import residual, skin_map
-from ..domain.effects.effect import Interval
+from ..domain.effects.effect import Interval, inside
 from ..domain.errors import InputError, nearest
-from ..domain.parameters import PARAMETERS
 from ..domain.shot import Maps
 from ..domain.udim import find_tiles
-from .map_files import CHANNELS
+from .map_files import CHANNELS, check_channel, read_header
 
 Tiles = dict[int, np.ndarray]
 """UDIM tile -> (H, W, 3 or 4) float32, row 0 lowest; {1001: …} for an ordinary picture."""
@@ -66,13 +65,13 @@ def _skin_tile(path: Path, digest: Any) -> tuple[np.ndarray, dict[str, Interval]
             raise InputError(f"{path}: channel {name}: {nearest(name, skin_map.CHANNELS)}")
     held = [name for name in skin_map.CHANNELS if name in names]
     if not held:
-        raise InputError(f"{path}: channels: none of {', '.join(skin_map.CHANNELS)}")
+        raise InputError(f"{path}: channels: {', '.join(names)[:200]}: none of {', '.join(skin_map.CHANNELS)}")
     image = np.zeros((*pixels.shape[:2], len(skin_map.CHANNELS)), dtype=np.float32)
     ranges = {}
     for name in held:
-        row = PARAMETERS[name]
         values = pixels[..., names.index(name)]
-        ranges[name] = _range(values, f"{path}: channel {name}", row.hard_min, row.hard_max)
+        check_channel(values, name, str(path))
+        ranges[name] = inside(name, (float(values.min()), float(values.max())))
         image[..., skin_map.CHANNELS.index(name)] = values
     return image, ranges
 
@@ -83,29 +82,23 @@ def _residual_tile(path: Path, digest: Any) -> np.ndarray:
     if missing:
         raise InputError(f"{path}: channel {missing[0]}: missing, a residual has {', '.join(_RGB)}")
     image = np.ascontiguousarray(pixels[..., [names.index(name) for name in _RGB]])
-    _range(image, f"{path}: channels {', '.join(_RGB)}", 0.0, _LARGEST_FACTOR)
+    for i, name in enumerate(_RGB):
+        check_channel(image[..., i], name, str(path))
+        for value in (float(image[..., i].min()), float(image[..., i].max())):
+            if not 0.0 <= value <= _LARGEST_FACTOR:
+                raise InputError(f"{path}: channel {name}: {value:g} is outside 0 to {_LARGEST_FACTOR:g}")
     return image
 
 
 def _read(path: Path, digest: Any) -> tuple[np.ndarray, list[str]]:
+    """Pixels and channels of anybody's EXR; one whose header says that it is Sanguine's has to be what it says."""
     try:
-        pixels, names, _ = sanguine_core.read_exr_map(str(path))
+        pixels, names, attributes = sanguine_core.read_exr_map(str(path))
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     except OSError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from None
+    if "sanguine:schema" in attributes:
+        read_header(path)
     return pixels, names
-
-
-def _range(values: np.ndarray, where: str, low: float, high: float) -> Interval:
-    """Least and greatest value. Raises InputError beyond `low` to `high` and for what is no number."""
-    least, greatest = float(values.min()), float(values.max())
-    if not np.isfinite(values).all():
-        raise InputError(f"{where}: not every texel is a number")
-    # A map in half floats may step over an end by its rounding.
-    slack = 1e-3 * (high - low)
-    for value in (least, greatest):
-        if not low - slack <= value <= high + slack:
-            raise InputError(f"{where}: {value:g} is outside {low:g} to {high:g}")
-    return max(least, low), min(greatest, high)

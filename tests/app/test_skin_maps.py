@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sanguine_core
 from sanguine.app.batch import render_batch
+from sanguine.app.map_files import MapHeader, header_attributes
 from sanguine.app.planning import plan_report
 from sanguine.app.skin_maps import read_face_maps
 from sanguine.domain.effects.regions import FACE_REGIONS
@@ -121,9 +122,10 @@ def test_a_batch_gives_the_maps_on_and_renders_anew_when_they_change(folder):
         ('skinn = "a.exr"', ["shot.toml", "maps.skinn", "did you mean 'skin'"]),
         ("skin = 3", ["shot.toml", "maps.skin"]),
         ('skin = "maps/text.exr"', ["text.exr"]),
-        ('skin = "maps/residual.exr"', ["residual.exr", "channel", "hemoglobin"]),
+        ('skin = "maps/residual.exr"', ["residual.exr", "channels: B, G, R", "hemoglobin"]),
+        ('skin = "maps/percent.exr"', ["percent.exr", "melanin", "unit"]),
         ('residual = "maps/chromophores.exr"', ["chromophores.exr", "channel R", "missing"]),
-        ('skin = "maps/much.exr"', ["much.exr", "melanin", "0.899902", "0 to 0.5"]),
+        ('skin = "maps/much.exr"', ["much.exr", "melanin", "0.89", "0 to 0.5"]),
         ('residual = "maps/negative.exr"', ["negative.exr", "-1", "0 to"]),
     ],
     ids=lambda v: None if isinstance(v, list) else v,
@@ -132,6 +134,8 @@ def test_bad_maps_are_one_line(folder, maps, words):
     (folder / "maps" / "text.exr").write_text("no picture")
     write(folder / "maps" / "much.exr", melanin=0.9)
     write(folder / "maps" / "negative.exr", R=-1.0, G=1.0, B=1.0)
+    attributes = header_attributes(["melanin"], MapHeader()) | {"sanguine:units": '{"melanin": "percent"}'}
+    sanguine_core.write_exr_map(folder / "maps" / "percent.exr", np.full((2, 2, 1), 0.02, np.float32), ["melanin"], attributes)
     with pytest.raises(InputError) as caught:
         read_face_maps(shot(folder, maps).subjects[0].maps)
     assert "\n" not in str(caught.value)
