@@ -21,7 +21,7 @@ from ..domain.effects import strain as strain_effect
 from ..domain.effects import wrinkles as wrinkles_effect
 from ..domain.effects.regions import region_images
 from ..domain.errors import InputError
-from ..domain.plan import Plan
+from ..domain.plan import Plan, make_plan
 from ..domain.texel_density import MapSizes
 from ..domain.udim import FIRST_TILE, tile_offset, tiles_of
 from .map_cache import MapCache, key_of
@@ -162,6 +162,18 @@ def bake_maps(
             if (image := _bake(name, plan, layers, sizes.smooth)) is not None:
                 made.setdefault(name, {})[tile] = image
     return made
+
+
+def reached(plan: Plan, images: Mapping[str, np.ndarray | Mapping[int, np.ndarray]]) -> Plan:
+    """The plan once its features are painted: its table goes as far as their sums do, not as far as they might."""
+    found = {}
+    for name in grown.MAPS.keys() & images.keys():
+        tiles = list(images[name].values()) if isinstance(images[name], Mapping) else [images[name]]
+        found[name] = {
+            channel: (min(float(tile[..., i].min()) for tile in tiles), max(float(tile[..., i].max()) for tile in tiles))
+            for i, channel in enumerate(grown.MAPS[name])
+        }
+    return make_plan(replace(plan.scene, maps={**plan.scene.maps, **found}), plan.settings) if found else plan
 
 
 def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:

@@ -9,6 +9,7 @@ from ..domain.facs import EMOTION_CONTROLS
 from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
+from .material import MARK
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
@@ -78,13 +79,13 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             measure_maps(face)
             regions = find_face_regions(face)
             plan = live_plan(face)
-            apply_skin(face, rig, plan, skin_slot(face))
+            material = apply_skin(face, rig, plan, skin_slot(face))
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         context.scene.cycles.shading_system = True
         running = ", ".join(effect.label for effect in plan.active)
-        done = f"{running}; {plan.entries} skins solved; {len(driven.driven)} shape keys driven"
+        done = f"{running}; {material[MARK]['entries']} skins solved; {len(driven.driven)} shape keys driven"
         self.report({"INFO"}, f"{done}; {regions}" if regions else done)
         return {"FINISHED"}
 

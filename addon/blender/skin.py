@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-from ..app.maps import Surface, bake_maps, strain_coefficients, wrinkle_coefficients
+from ..app.maps import Surface, bake_maps, reached, strain_coefficients, wrinkle_coefficients
 from ..domain.blood import BLOOD_CHANNELS
 from ..domain.effects import strain, wrinkles
 from ..domain.errors import InputError
@@ -34,6 +34,7 @@ def apply_skin(
     """
     surface = read_surface(face) if plan.maps else None
     maps = _maps(face, surface, plan, images_of(face) if given is None else given, progress) if surface else {}
+    plan = reached(plan, maps)
     before = face.material_slots[slot].material if face.material_slots else None
     if before is not None and MARK in before and before.users == 1:
         remove_skin_material(before)

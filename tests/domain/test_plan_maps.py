@@ -2,8 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 import sanguine_core
+from sanguine.app.maps import reached
 from sanguine.domain.blood import ANATOMY
 from sanguine.domain.effects import EFFECTS, Frame, Scene, grown
 from sanguine.domain.lut import bake
@@ -61,6 +63,25 @@ def test_a_feature_widens_what_it_changes(monkeypatch):
     text = sources(plan)["chromophores"]
     assert "#define GROWN_LOG_MELANIN 1\n" in text and "#define GROWN_LOG_OIL 0\n" in text
     assert "color grown = " in text and "float grown_oxygenation = " in text and "relief" not in sources(plan)
+
+
+def test_painted_features_reach_as_far_as_their_sum(monkeypatch):
+    """Two features that hardly meet: the table holds what the map holds, and the shader stays as it is."""
+    declare(monkeypatch, "spotted", log_melanin=(0.0, 1.5))
+    declare(monkeypatch, "inked", log_melanin=(-0.5, 1.0), ink_per_mm=(0.0, 6.0))
+    before = make_plan(scene(strengths={"spotted": 1.0, "inked": 0.5, "anatomy": 0.0}))
+    image = np.zeros((2, 2, 4), dtype=np.float32)
+    image[0, 0, 1], image[1, 1, 1] = -0.2, 1.4
+    ink = np.array([0.0, 0.0, 0.0, 2.0], dtype=np.float32).reshape(2, 2, 1)
+    after = reached(before, {"grown": {1001: image, 1002: image * 0.5}, "grown_ink": ink, "anatomy": ink})
+    melanin = default_skin()["melanin"]
+    assert (axes(before)["melanin"].low, axes(before)["melanin"].high) == pytest.approx(
+        (melanin * math.exp(-0.25), melanin * math.exp(2.0)))
+    assert (axes(after)["melanin"].low, axes(after)["melanin"].high) == pytest.approx(
+        (melanin * math.exp(-0.2), melanin * math.exp(1.4)))
+    assert axes(after)["ink_per_mm"].high == 2.0 and after.entries < before.entries
+    assert after.maps == before.maps and [f.file for f in after.fragments] == [f.file for f in before.fragments]
+    assert reached(before, {"anatomy": ink}) is before
 
 
 def test_features_share_maps_and_fragments(monkeypatch):

@@ -54,8 +54,8 @@ class Scene:
     # True while an artist works: every control may still move, so axes span what sliders reach.
     live: bool = False
     growth: Growth = Growth()
-    # Maps that came with the face (from a picture, from elsewhere): map id -> chromophore that it holds -> the range
-    # over its texels.
+    # Maps that came with the face (from a picture, from elsewhere) or are painted already: map id -> what it holds ->
+    # the range over its texels.
     maps: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
     # Whether the face has shape keys, by which it moves, and a vertex group (or attribute) of outer pressure.
     shape_keys: bool = True

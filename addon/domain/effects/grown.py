@@ -10,7 +10,18 @@ from typing import Any
 
 import sanguine_core
 
-from .effect import Activation, Bounds, Effect, Fragment, Scene, ShaderInput, scale_bounds, shift_bounds, strength_activation
+from .effect import (
+    Activation,
+    Bounds,
+    Effect,
+    Fragment,
+    Interval,
+    Scene,
+    ShaderInput,
+    scale_bounds,
+    shift_bounds,
+    strength_activation,
+)
 
 MAPS = {
     "grown": ("log_hemoglobin", "log_melanin", "log_oil", "oxygenation"),
@@ -69,9 +80,8 @@ def _fragments(scene: Scene, row: dict[str, Any]) -> tuple[Fragment, ...]:
 
 
 def _bounds(scene: Scene, bounds: Bounds, row: dict[str, Any]) -> Bounds:
-    strength = scene.strengths[row["id"]]
     for change in row["changes"]:
-        low, high = strength * change["low"], strength * change["high"]
+        low, high = _reach(scene, row, change)
         chromophore = _FACTORS.get(change["channel"], change["channel"])
         if chromophore not in bounds:  # oil and height have no axis
             continue
@@ -81,6 +91,20 @@ def _bounds(scene: Scene, bounds: Bounds, row: dict[str, Any]) -> Bounds:
         elif change["channel"] in _CHANGES:
             bounds = shift_bounds(bounds, chromophore, dict.fromkeys(bounds[chromophore], (low, high)))
     return bounds
+
+
+def _reach(scene: Scene, row: dict[str, Any], change: dict[str, Any]) -> Interval:
+    """What a feature may add to its channel; of a map that is painted, what the sum was found to be, with the first."""
+    found = {channel: interval for name in MAPS for channel, interval in scene.maps.get(name, {}).items()}
+    if change["channel"] not in found:
+        strength = scene.strengths[row["id"]]
+        return strength * change["low"], strength * change["high"]
+    first = next(
+        name
+        for name, other in ROWS.items()
+        if scene.strengths.get(name, 0.0) > 0.0 and change["channel"] in [c["channel"] for c in other["changes"]]
+    )
+    return found[change["channel"]] if row["id"] == first else (0.0, 0.0)
 
 
 def _activate(scene: Scene, row: dict[str, Any]) -> Activation:
