@@ -79,8 +79,8 @@ def _load(path: Path) -> np.ndarray | None:
 
 
 def key_of(*what: Any) -> str:
-    """A hash of numbers, texts, lists, dicts and arrays, and of the native code that turns them into maps."""
-    digest = hashlib.sha256(_native_code().encode())
+    """A hash of numbers, texts, lists, dicts and arrays, and of the program that turns them into maps."""
+    digest = hashlib.sha256(_program())
     for part in what:
         if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype.str}{part.shape}".encode())
@@ -91,7 +91,11 @@ def key_of(*what: Any) -> str:
 
 
 @functools.cache
-def _native_code() -> str:
-    """Another build may paint another picture without another version."""
-    with open(sanguine_core._core.__file__, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _program() -> bytes:
+    """Another build, or an edit of the files that lead to a map, may paint another picture without another version."""
+    here = Path(__file__).resolve().parent
+    sources = sorted(path for folder in (here, here.parent / "domain") for path in folder.rglob("*.py"))
+    digest = hashlib.sha256()
+    for path in (Path(sanguine_core._core.__file__), *sources):
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.digest()
