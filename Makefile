@@ -56,6 +56,7 @@ bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour
 	$(VENV)/bin/sanguine bench accuracy
 	$(PY) bench/measured_skin.py
 	$(PY) bench/inversion.py
+	$(PY) bench/measured_people.py
 	$(PY) bench/picture.py
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
