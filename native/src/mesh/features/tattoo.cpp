@@ -60,15 +60,14 @@ std::vector<Stroke> sprig() {
     Pen pen;
     const auto stem = [](float t) { return glm::vec2(2.2F * (t * t - t) * 4 + 1.5F, -15 + 30 * t); };
     for (int i = 0; i < 16; ++i) pen.line(stem(float(i) / 16), stem(float(i + 1) / 16));
-    for (int i = 1; i <= 6; ++i) {
-        const glm::vec2 root = stem(float(i) / 7);
-        const float length = 7.5F - 0.75F * float(i);
+    for (int i = 1; i <= 5; ++i) {
+        const glm::vec2 root = stem(float(i) / 6);
+        const float length = 9 - float(i);
         for (const float side : {-1.0F, 1.0F}) {
             const glm::vec2 along = glm::normalize(glm::vec2(side, 0.75F)), across(-along.y, along.x);
             const glm::vec2 tip = root + length * along, middle = root + 0.45F * length * along;
             pen.curve(root, middle + 0.38F * length * across, tip);
             pen.curve(root, middle - 0.38F * length * across, tip);
-            pen.line(root, root + 0.7F * length * along);
         }
     }
     const glm::vec2 top = stem(1);
@@ -96,13 +95,13 @@ std::vector<Stroke> rose() {
 /// Part of a band: two lines with diamonds and dots between.
 std::vector<Stroke> band() {
     Pen pen;
-    for (const float y : {-4.0F, -3.0F, 3.0F, 4.0F}) pen.line({-17, y}, {17, y});
-    for (int i = -3; i <= 3; ++i) {
-        const float x = 5 * float(i);
-        pen.polygon({{x - 2.2F, 0}, {x, 2.4F}, {x + 2.2F, 0}, {x, -2.4F}});
-        pen.circle({x, 0}, 0.6F, 8);
-        if (i < 3)
-            for (const float y : {-1.9F, 1.9F}) pen.circle({x + 2.5F, y}, 0.25F, 6);
+    for (const float y : {-4.5F, 4.5F}) pen.line({-17, y}, {17, y});
+    for (int i = -2; i <= 2; ++i) {
+        const float x = 6.8F * float(i);
+        pen.polygon({{x - 2.9F, 0}, {x, 3.2F}, {x + 2.9F, 0}, {x, -3.2F}});
+        pen.circle({x, 0}, 0.5F, 8);
+        if (i < 2)
+            for (const float y : {-2.4F, 2.4F}) pen.circle({x + 3.4F, y}, 0.2F, 6);
     }
     return pen.strokes;
 }
@@ -136,7 +135,7 @@ public:
 
         const auto motif = std::size_t(random.uniform() * 3);
         strokes_ = motif == 0 ? sprig() : motif == 1 ? rose() : band();
-        const float scale = face->scale() * (where == 2 ? random.uniform(1.2F, 1.6F) : random.uniform(0.6F, 0.8F));
+        const float scale = face->scale() * (where == 2 ? random.uniform(1.4F, 1.8F) : random.uniform(0.85F, 1.1F));
         for (Stroke& stroke : strokes_) {
             stroke.from *= scale;
             stroke.to *= scale;
@@ -144,7 +143,7 @@ public:
         }
         // A fine needle's line, and what time makes of it: ink spreads and pales.
         const float old = smooth_step(25, 80, float(person.age_years));
-        width_mm_ = 0.5F + 0.35F * old;
+        width_mm_ = 0.45F + 0.35F * old;
         ink_per_mm_ = most_ink_per_mm * (1 - 0.4F * old);
         reach_mm_ += width_mm_;
     }
