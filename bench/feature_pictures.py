@@ -1,8 +1,8 @@
-"""What grows on skin: pictures of each feature alone and of people of several tones, and what each costs.
+"""What grows on skin: a picture of each feature alone, and what each costs.
 
-    python bench/feature_pictures.py [--out docs] [--only freckles,people,times] [--samples 64]
+    python bench/feature_pictures.py [--out docs] [--only freckles,times] [--samples 64]
 
-Writes maps_features.jpg and maps_people.jpg, contact sheets of rendered heads, and the table in docs/maps.md.
+Writes maps_features.jpg, a contact sheet of rendered heads, and the table in docs/maps.md.
 """
 
 from __future__ import annotations
@@ -27,13 +27,6 @@ FACE = (0.18, 0.72, 0.27, 0.84)
 BASE = {"epidermis_thickness_mm": 0.05, "melanin": 0.016, "hemoglobin": 0.012, "oxygenation": 0.8, "oil": 0.6, "roughness": 0.3}
 # What one feature is shown on: even, bare skin, with the relief that any skin has.
 PLAIN = {"anatomy": 1.0, "relief": 1.0}
-PEOPLE = [
-    ("female", {"tone": "monk-2", "sex": "female", "age": 22, "seed": 3, "sun": 0.6}),
-    ("male", {"tone": "monk-4", "sex": "male", "age": 48, "seed": 5, "sun": 0.7}),
-    ("female", {"tone": "monk-5", "sex": "female", "age": 34, "seed": 1}),
-    ("female", {"tone": "monk-7", "sex": "female", "age": 29, "seed": 2}),
-    ("male", {"tone": "monk-9", "sex": "male", "age": 40, "seed": 4}),
-]
 
 
 def shot_of(head: str, samples: int, **tables: object) -> Shot:
@@ -91,7 +84,7 @@ def write_table(page: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("docs"))
-    parser.add_argument("--only", default="", help="ids of features, 'none', 'all', 'people', 'times'")
+    parser.add_argument("--only", default="", help="ids of features, 'none', 'all', 'times'")
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--keep", type=Path, help="folder for the single pictures")
     options = parser.parse_args()
@@ -113,12 +106,6 @@ def main() -> None:
             sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_features.jpg", columns=6)
         if not wanted or "times" in wanted:
             write_table(options.out / "maps.md")
-        if not wanted or "people" in wanted:
-            made = []
-            for head, person in PEOPLE:
-                shot = shot_of(head, options.samples, person=person, effects={"relief": 1.0})
-                made.append(render(renderer, shot, folder / f"{person['tone']}, {person['sex']}, {person['age']}.png"))
-            sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_people.jpg", columns=5)
 
 
 if __name__ == "__main__":
