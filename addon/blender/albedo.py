@@ -25,7 +25,7 @@ def read_picture(face: bpy.types.Object, image: bpy.types.Image, shading: str = 
     before = [getattr(face.sanguine, name) for name in (skin_map.MAP, residual.MAP)]
     # Amounts take 32 bits: half floats round to 1 in 2000 of a fraction, which shows as bands where melanin is thin.
     blood = data_image(f"{image.name} skin", made["skin_map"])
-    store_range(blood, {**made["ranges"], "oil": (skin_of(face)["oil"],) * 2})
+    store_range(blood, made["ranges"])  # a picture says nothing of oil: the face's own slider stays
     face.sanguine.skin_map = blood
     face.sanguine.residual = data_image(f"{image.name} residual", made["residual"], half=True)
     for old in before:

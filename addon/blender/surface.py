@@ -111,11 +111,12 @@ def pixel_mm(scene: bpy.types.Scene, obj: bpy.types.Object) -> float | None:
 def read_surface(obj: bpy.types.Object) -> Surface:
     """UVs, triangles and region masks of a mesh. Raises InputError when it has no UV map."""
     mesh = obj.data
-    if mesh.uv_layers.active is None:
+    layer = next((each for each in mesh.uv_layers if each.active_render), None)  # the one that Cycles shows maps by
+    if layer is None:
         raise InputError(f"{obj.name}: no UV map, which the chromophore maps need: unwrap it first")
     corners = len(mesh.loops)
     uv = np.empty(corners * 2, dtype=np.float32)
-    mesh.uv_layers.active.data.foreach_get("uv", uv)
+    layer.data.foreach_get("uv", uv)
     corner_vertex = np.empty(corners, dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corner_vertex)
     mesh.calc_loop_triangles()
