@@ -470,7 +470,7 @@ MaskRule mask_rule(const SkinPoint& centre, const SkinPoint& spread, double nois
     r.above[1] = std::clamp(3.5f * spread[1], 2.3f, 2.6f);
     r.below[1] = std::clamp(3.5f * spread[1], 1.4f, 1.8f);
     r.above_near = 1.5f;
-    r.above_patch = 0.42f;
+    r.above_patch = 0.36f;
     r.hair = std::clamp(3.5f * std::sqrt(spread[0] * spread[0] + spread[1] * spread[1]), 1.5f, 1.7f);
     r.error_free = float(3 + 2 * noise_sd);
     return r;
@@ -484,7 +484,7 @@ SANGUINE_INLINE float distance_from_skin(const MaskRule& r, float m, float h, fl
     const float pm = beyond(dm, r.above[0]) + beyond(-dm, r.below[0]);
     const float ph = beyond(dh, r.above[1]) + beyond(-dh, r.below[1]);
     const float near = beyond(dn, r.above_near);
-    const float patch = dn > 0.4f ? beyond(m_patch - m_near, r.above_patch) : 0.0f;
+    const float patch = dn > 0.4f ? 1.5f * beyond(m_patch - m_near, r.above_patch) : 0.0f;
     const float hair = dn > 0.4f ? beyond(dn - dh, r.hair) : 0.0f;
     const float e = std::sqrt(lab_error_squared) - r.error_free;
     const float pe = e > 0 ? e * (1.0f / 3) : 0.0f;
