@@ -11,6 +11,18 @@ pixels = sanguine_core.rasterize_uv(
 view = pixels[2:, 2:]
 del pixels
 assert view.max() == 1
+surface = sanguine_core.SkinSurface(
+    numpy.array([[0, 0, 0], [9, 0, 0], [0, 0, 9]], numpy.float32), numpy.array([[0, 0], [1, 0], [0, 1]], numpy.float32),
+    numpy.array([[0, 1, 2]], numpy.int32), numpy.arange(3, dtype=numpy.int32), [], numpy.zeros((3, 0), numpy.float32))
+texels = surface.texels(8, 8, 0)
+layer = sanguine_core.grow("pores", surface, texels, 1, 30.0, 0.5, 0.0, progress=lambda done, total: True)
+place = texels.place_mm
+del texels
+assert place.max() <= 9 and len(layer) == len(place)
+try:
+    sanguine_core.grow("absent", surface, surface.texels(8, 8, 0), 1, 30.0, 0.5, 0.0)
+except ValueError:
+    pass
 with sanguine_core.MapWriter("a.exr", 4, 2, ["melanin"], {}) as writer:
     writer.write_rows(numpy.zeros((2, 4, 1), numpy.float32))
 reader = sanguine_core.RowReader("a.exr")
