@@ -222,6 +222,8 @@ def _invert(options: argparse.Namespace) -> int:
                              noise=noise, progress=progress)
     for warning in report["warnings"]:
         print(f"sanguine: {warning}", file=sys.stderr)
+    _answer(report, options.out)
+    return 0
 
 
 def _maps(options: argparse.Namespace) -> int:
