@@ -189,7 +189,7 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
         return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
     if name in strain_effect.IMAGES:
         key = key_of(face.motion_digest, name, size, _PADDING)
-        return cache.get(key, lambda: _components(face, size, face.moving.area.values, strain_effect.IMAGES.index(name)))
+        return cache.get(key, lambda: _strain(face, size, strain_effect.IMAGES.index(name)))
     if name in wrinkles_effect.IMAGES:
         size = min(layers.size, _LARGEST_WRINKLES)
         key = key_of(face.motion_digest, name, size, _PADDING)
@@ -209,16 +209,17 @@ def wrinkle_coefficients(face: Surface, cache: MapCache | None = None) -> np.nda
     return (cache or MapCache()).get(key, lambda: face.moving.welded_folds.coefficients)
 
 
-def _components(face: Surface, size: int, values: np.ndarray, image: int) -> np.ndarray:
-    """Four components (of values (C, V)) in one image, (size, size, 4)."""
-    return _draw(face, size, values[4 * image : 4 * image + 4].T, np.zeros(4, dtype=np.float32))
+def _strain(face: Surface, size: int, image: int) -> np.ndarray:
+    """Four components of the change of area, (size, size, 4)."""
+    return _draw(face, size, face.moving.area.values[4 * image : 4 * image + 4].T, np.zeros(4, dtype=np.float32))
 
 
 def _wrinkles(face: Surface, size: int, image: int) -> np.ndarray:
     """Heights in mm of four fold patterns, (size, size, 4)."""
     depth, phase = face.furrows
     four = slice(4 * image, 4 * image + 4)
-    drawn = _draw(face, size, np.vstack([face.position_mm.T, depth[four], phase[four]]).T, np.zeros(11, dtype=np.float32))
+    per_vertex = np.vstack([face.position_mm.T, depth[four], phase[four]]).T
+    drawn = _draw(face, size, per_vertex, np.zeros(11, dtype=np.float32))
     heights = np.zeros((size, size, 4), dtype=np.float32)
     for i in range(4):
         at = drawn[..., 3 + i] > 0.0

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..domain.effects.strain import HALVES
 from ..domain.effects import strain, wrinkles
-from ..domain.key_sums import KeySum, key_sums
+from ..domain.effects.strain import HALVES
+from ..domain.key_sums import MAX_EXPRESSION, KeySum, key_sums
 
 # Coefficients below this share of a component are left out: together they move no map by as much as its rounding.
 LEAST = 0.004
@@ -38,26 +38,21 @@ def drive_components(
 
 def remove_components(face: bpy.types.Object) -> None:
     """Removes the properties of `drive_components` and their drivers."""
-    for image in (*strain.IMAGES, *wrinkles.IMAGES):
-        for half in HALVES:
-            for name in [key for key in face.keys() if key == f"{image}_{half}" or key.startswith(f"{image}_{half}{_PART}")]:
-                face.driver_remove(f'["{name}"]', -1)
-                del face[name]
+    ours = {f"{image}_{half}" for image in (*strain.IMAGES, *wrinkles.IMAGES) for half in HALVES}
+    for name in [key for key in face.keys() if key.partition(_PART)[0] in ours]:
+        face.driver_remove(f'["{name}"]', -1)
+        del face[name]
 
 
 def _drive_property(face: bpy.types.Object, name: str, sums: list[list[KeySum]], one_sided: bool) -> None:
     face[name] = [0.0] * len(sums)
     _describe(face, name)
-    parts = max(map(len, sums), default=0)
-    for part in range(parts if parts > 1 else 0):
-        face[f"{name}{_PART}{part}"] = [0.0] * len(sums)
-        _describe(face, f"{name}{_PART}{part}")
     for i, several in enumerate(sums):
         if not several:
             continue
         if len(several) == 1:
             expression = f"max(0,{several[0].expression})" if one_sided else several[0].expression
-            if len(expression) < 255:
+            if len(expression) < MAX_EXPRESSION:
                 _drive(face, name, i, expression, {v: _value_of(face, key) for v, key in several[0].keys.items()})
                 continue
         chain = {}
@@ -81,7 +76,7 @@ def _value_of(face: bpy.types.Object, key: str) -> Target:
 
 def _drive(face: bpy.types.Object, name: str, index: int, expression: str, variables: dict[str, Target]) -> None:
     curve = face.driver_add(f'["{name}"]', index)
-    curve.keyframe_points.clear()  # the default curve is an identity that rounds; without keys the value passes as it is
+    curve.keyframe_points.clear()  # the default curve is an identity that rounds; without keys values pass as they are
     driver = curve.driver
     driver.type = "SCRIPTED"
     for variable, (kind, owner, path) in variables.items():

@@ -1,4 +1,4 @@
-"""Strain of a face that its shape keys move, compressed into few maps: where blood is pushed out or pools, where skin folds.
+"""Strain of a face that its shape keys move, compressed into few maps: where blood goes, where skin folds.
 
 Of some fifty keys a few components are kept: a map each, and for every key and half of the face the coefficient by
 which its value drives the map there. Coefficients are fitted to the exact strain of single keys, action units and
@@ -24,18 +24,17 @@ COMPONENTS = 8
 # Directions: stretched skin loses blood flow and regains more than it had when it is let go (Goding et al. 1988,
 # tissue expanders in pigs); what presses on skin drives its blood out (Lim et al. 2011, J. Biomed. Opt. 16:011012;
 # Popov et al. 2017, J. Biomed. Opt. 22:110504, in steps, bed by bed). No source gives the amount by strain on a face:
-# all numbers are guesses. Blood that merely stays in its patch of skin would give 1 per unit of log area.
-STRETCH_PER_LOG_AREA = 1.2  # loss
+# all numbers are guesses.
+STRETCH_PER_LOG_AREA = 1.0  # loss: that of blood which stays in its patch of skin
 POOL_PER_LOG_AREA = 1.2  # gain, while skin gets denser in its plane
 FOLD_FROM_LOG_AREA = -0.15  # from here on it folds, and folds press their own skin: the nasolabial fold of a smile,
 FOLD_PER_LOG_AREA = 1.8  # the brow of a frown; loss
-LOW, HIGH = -0.6, -POOL_PER_LOG_AREA * FOLD_FROM_LOG_AREA
-"""The range of the change: blood left at 0.55 of what it was, or risen to 1.20 times."""
+LOW, HIGH = -0.5, -POOL_PER_LOG_AREA * FOLD_FROM_LOG_AREA
+"""The range of the change: blood left at 0.61 of what it was, or risen to 1.20 times."""
 
 _MOST_LOG_AREA = 0.65  # beyond this, either way, blood_change has reached its end: components need not follow
 
-# Strain of less is taken up in the plane of the skin, which is under tension at rest: a guess (Flynn & McCormack 2010
-# put facial pre-strain at some 5-10 %).
+# Strain of less is taken up in the plane of the skin, which is under tension at rest: a guess.
 WRINKLE_FROM_STRAIN = 0.06
 
 HALF_BLEND_MM = 8.0
@@ -259,14 +258,20 @@ def area_components(surface: MovingSurface, count: int) -> Components:
     square = _dot("av,bv->ab", halved, halved)
     square += 1e-6 * np.trace(square) / max(len(square), 1) * np.eye(len(square))  # a component may miss one half
     weighted = weight[:, None] * asked
-    right = np.linalg.solve(square, _dot("av,pv->ap", halved, rows) @ weighted)
-    coefficients = np.linalg.solve(weighted.T @ weighted, right.T).T.reshape(2, len(basis), len(surface.keys.names))
-    return Components(_padded(values, 0, count).astype(np.float32), _padded(coefficients, 1, count))
+    right = np.linalg.solve(square, _dot("ap,pk->ak", _dot("av,pv->ap", halved, rows), weighted))
+    coefficients = np.linalg.solve(_dot("pk,pl->kl", weighted, weighted), right.T).T
+    coefficients = coefficients.reshape(2, len(basis), len(surface.keys.names))
+    return Components(_padded(values, 0, count).astype(np.float32), _rounded(_padded(coefficients, 1, count)))
 
 
 def _halved(basis: np.ndarray, halves: np.ndarray) -> np.ndarray:
     """(C, V) -> (2 C, V): each component in the left half, then each in the right one."""
     return (halves[:, None] * basis).reshape(-1, basis.shape[1])
+
+
+def _rounded(coefficients: np.ndarray) -> np.ndarray:
+    """Without the last digits, which differ between numbers of threads of LAPACK."""
+    return np.round(coefficients, 6) + 0.0
 
 
 def _padded(values: np.ndarray, axis: int, count: int) -> np.ndarray:
@@ -329,7 +334,7 @@ def fold_components(surface: MovingSurface, count: int, rounds: int = 150) -> Fo
         stretch = _dot("kvx,vx,sv->sk", surface.strains, square, matter) / total[:, None]
         coefficients[:, c] = np.where(stretch > coefficients[:, c], -np.minimum(stretch, 1.0), coefficients[:, c])
     across = _padded(across, 0, count).astype(np.float32)
-    return Folds(_padded(values, 0, count).astype(np.float32), _padded(coefficients, 1, count), across)
+    return Folds(_padded(values, 0, count).astype(np.float32), _rounded(_padded(coefficients, 1, count)), across)
 
 
 def _non_negative(rows: np.ndarray, count: int, rounds: int) -> np.ndarray:
@@ -367,8 +372,8 @@ def _non_negative_keys(
 
     alone: (K, V) what each key does by itself; where that is nothing a key drives nothing.
     """
-    among, among_keys = _dot("av,bv->ab", basis, basis), poses.T @ poses
-    wanted = np.maximum(_dot("av,pv->ap", basis, rows) @ poses, 0.0)
+    among, among_keys = _dot("av,bv->ab", basis, basis), _dot("pk,pl->kl", poses, poses)
+    wanted = np.maximum(_dot("ap,pk->ak", _dot("av,pv->ap", basis, rows), poses), 0.0)
     own = _dot("av,kv->ak", basis, alone)
     found = own / np.maximum(np.diag(among), 1e-12)[:, None]
     found[own < 1e-3 * own.max(axis=0, initial=0.0)] = 0.0

@@ -9,22 +9,22 @@ import sanguine_core
 
 from .strain import MovingSurface
 
-# Distance from furrow to furrow by region, in mm. Guesses by eye, from one's own face and photographs: the papers on
-# wrinkles measure their depth (Lemperle et al. 2001, Plast. Reconstr. Surg. 108:1735) and count, not their distance.
+# Distance from furrow to furrow by region, in mm. Guesses by eye: the papers on wrinkles measure their depth (Lemperle
+# et al. 2001, Plast. Reconstr. Surg. 108:1735), not their distance.
 SPACING_MM = {
-    "forehead": 6.5, "nose": 3.5, "eyelids": 3.0, "cheeks": 6.0, "lips": 3.0, "chin": 4.5, "neck": 14.0, "ears": 6.0,
+    "forehead": 9.0, "nose": 3.5, "eyelids": 3.0, "cheeks": 6.0, "lips": 3.0, "chin": 4.5, "neck": 14.0, "ears": 6.0,
 }
 SPACING_ELSEWHERE_MM = 5.0
 
 # How readily skin folds, by region: thick fat under the cheeks and the stiff ears bulge instead. Guesses by eye.
 READINESS = {
-    "forehead": 1.2, "nose": 0.8, "eyelids": 1.0, "cheeks": 0.2, "lips": 0.5, "chin": 0.6, "neck": 0.5, "ears": 0.0,
+    "forehead": 1.0, "nose": 0.8, "eyelids": 1.0, "cheeks": 0.2, "lips": 0.5, "chin": 0.6, "neck": 0.5, "ears": 0.0,
 }
 READINESS_ELSEWHERE = 0.7
 
 # A sheet that keeps its length while its ends approach by the share c throws sine waves of half height
-# L sqrt(c) / pi; most of the way is taken up below the surface, though. The share is a guess: it gives the 0.2-0.6 mm
-# of the lower grades of Lemperle et al. for a whole expression of a young face.
+# L sqrt(c) / pi; most of the way is taken up below the surface, though. The share is a guess by eye: it gives some
+# 0.2-0.9 mm for a whole expression.
 DEPTH_SHARE = 0.24
 DEPTH_MAX_MM = 0.9
 _COMPRESSION_MAX = 0.5

@@ -1,5 +1,10 @@
 """Strain of the example head: how well few components stand for fifty keys, and what they cost when they are off."""
 
+import hashlib
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from sanguine.app.faces import example_head, head_surface
@@ -168,3 +173,20 @@ def test_sums_of_keys_fit_blenders_expressions_and_lose_nothing():
 def test_every_action_unit_of_the_face_moves_some_skin(moving):
     rows = strain.poses(moving.keys.names, [{unit.control: 1.0} for unit in ACTION_UNITS.values()])
     assert rows.shape[1] == len(moving.keys.names) and (rows.sum(axis=1) > 0).mean() > 0.9
+
+
+def test_the_number_of_threads_changes_no_bit(face):
+    """NumPy's LAPACK reads its threads when it is loaded, so the other run is a process of its own."""
+    code = (
+        "import hashlib; from sanguine.app.faces import example_head, head_surface\n"
+        "face = head_surface(example_head('female')); m = face.moving\n"
+        "parts = (m.area.values, m.area.coefficients, m.welded_folds.coefficients, *face.furrows)\n"
+        "print(*(hashlib.sha256(p.tobytes()).hexdigest() for p in parts))"
+    )
+    moving = face.moving
+    parts = (moving.area.values, moving.area.coefficients, moving.welded_folds.coefficients, *face.furrows)
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+    )
+    assert run.stdout.split() == [hashlib.sha256(part.tobytes()).hexdigest() for part in parts]

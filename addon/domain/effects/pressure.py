@@ -7,7 +7,7 @@ import math
 from .effect import Activation, Bounds, Effect, Fragment, Scene, ShaderInput, scale_bounds, strength_activation
 
 ATTRIBUTE = "sanguine_pressure"
-"""Vertex group or float attribute of the mesh, 0 to 1: painted, or written by Vertex Weight Proximity or geometry nodes."""
+"""Vertex group or float attribute of the mesh, 0 to 1: painted, or written by a modifier."""
 
 # What stays under full pressure. Blood leaves the beds of the skin one after another as pressure grows (Popov et al.
 # 2017, J. Biomed. Opt. 22:110504); in a finger pressed white the deeper ones keep theirs. How much: a guess.

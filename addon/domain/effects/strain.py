@@ -30,7 +30,8 @@ def component_inputs(images: tuple[str, ...]) -> tuple[ShaderInput, ...]:
     """Images of components, the properties that drive them in each half of the face, and the place that says which."""
     inputs = [ShaderInput("rest_mm", "vector", "vertex", "rest_mm")]
     for image in images:
-        inputs += [ShaderInput(image, "color", "map", image), ShaderInput(f"{image}_alpha", "float", "map:alpha", image)]
+        inputs.append(ShaderInput(image, "color", "map", image))
+        inputs.append(ShaderInput(f"{image}_alpha", "float", "map:alpha", image))
         for half in HALVES:
             name = f"{image}_{half}"
             inputs += [
