@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import sanguine_core
@@ -30,7 +29,7 @@ from .map_cache import MapCache, key_of
 _PADDING = 16
 
 # Texels along a side beyond which furrows some millimetres apart gain nothing.
-_LARGEST_WRINKLES = 2048
+LARGEST_WRINKLES = 2048
 
 Progress = Callable[[int, int], bool]
 
@@ -66,9 +65,8 @@ class Surface:
 
     @cached_property
     def motion_digest(self) -> str:
-        """`digest`, the shape keys, and the code that turns them into maps."""
-        recipe = [Path(module.__file__).read_text(encoding="utf-8") for module in (strain, wrinkles)]
-        return key_of(self.digest, list(self.moving.keys.names), self.moving.keys.delta_mm, recipe)
+        """`digest` and the shape keys."""
+        return key_of(self.digest, list(self.moving.keys.names), self.moving.keys.delta_mm)
 
     @cached_property
     def region_weights(self) -> np.ndarray:
@@ -191,7 +189,7 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
         key = key_of(face.motion_digest, name, size, _PADDING)
         return cache.get(key, lambda: _strain(face, size, strain_effect.IMAGES.index(name)))
     if name in wrinkles_effect.IMAGES:
-        size = min(layers.size, _LARGEST_WRINKLES)
+        size = min(layers.size, LARGEST_WRINKLES)
         key = key_of(face.motion_digest, name, size, _PADDING)
         return cache.get(key, lambda: _wrinkles(face, size, wrinkles_effect.IMAGES.index(name)))
     return None

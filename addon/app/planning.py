@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import sanguine_core
 
-from ..domain.effects import EFFECTS, grown
+from ..domain.effects import EFFECTS, grown, wrinkles
 from ..domain.framing import Framing, portrait
 from ..domain.lut import entry_skins
 from ..domain.plan import Plan, make_plan
@@ -15,7 +15,7 @@ from ..domain.quality import Choice
 from ..domain.shot import Shot, Subject, scene_of
 from ..domain.texel_density import map_sizes, mm_per_uv
 from .faces import example_head, head_surface
-from .maps import Surface
+from .maps import LARGEST_WRINKLES, Surface
 from .skin_maps import read_face_maps
 
 _TIMED_ENTRIES = 4
@@ -69,8 +69,10 @@ def _maps(plan: Plan, shot: Shot, surface: Surface, framing: Framing) -> list[di
     seen = f"a pixel covers {pixel_mm:.2g} mm" if pixel_mm else "the camera is inside the face"
     rows = []
     for name in [name for name in plan.maps if name not in plan.scene.maps]:
-        detail = name in grown.MAPS
+        detail = name in (*grown.MAPS, *wrinkles.IMAGES)
         size = sizes.detail if detail else sizes.smooth
+        if name in wrinkles.IMAGES:
+            size = min(size, LARGEST_WRINKLES)
         rows.append({
             "id": name,
             "size": size,

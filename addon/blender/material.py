@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-from ..domain.effects import EFFECTS, ShaderInput, grown, residual, skin_map
+from ..domain.effects import EFFECTS, ShaderInput, grown, residual, skin_map, strain, wrinkles
 from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
@@ -29,7 +29,7 @@ _OF_THE_FACE = (skin_map.MAP, residual.MAP)
 """Maps that come with the face and stay when the material goes."""
 
 # Maps that 16-bit floats hold: a rounding of 1 in 2000 does not show, and the file has half the size or less.
-_HALF = (*grown.MAPS, *_OF_THE_FACE)
+_HALF = (*grown.MAPS, *strain.IMAGES, *wrinkles.IMAGES, *_OF_THE_FACE)
 
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
 # Heights come in mm; the Bump node wants the height of "1" in scene units.
