@@ -32,8 +32,8 @@ struct Root {
 };
 
 // Diameters: sentinel vein 1.9 +- 0.8 mm, 27 mm from the outer corner of the eye (Yang et al. 2015, Surg. Radiol. Anat.
-// 37:175); the middle temporal vein has 3 mm but lies under fascia (Lee et al. 2014). Courses: anatomical atlases. The
-// rest are guesses.
+// 37:175); the middle temporal vein has 3 mm (CT angiographies of 150 patients) but lies under fascia. Courses:
+// anatomical atlases. The rest are guesses.
 constexpr Root roots[] = {
     {{6, -17, 13}, {0.05F, 0, 1}, 0.65F, 70, 20, 0.9F, 0.10F},           // supratrochlear (frontal)
     {{27, -10, 14}, {0.35F, 0.3F, 1}, 0.5F, 55, 18, 0.9F, 0.08F},        // supraorbital
