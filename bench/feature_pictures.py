@@ -25,8 +25,9 @@ WIDTH, HEIGHT, YAW = 640, 800, -22.0
 # Of the picture, from the left and from below: the face, where skin is to be judged.
 FACE = (0.18, 0.72, 0.27, 0.84)
 BASE = {"epidermis_thickness_mm": 0.05, "melanin": 0.016, "hemoglobin": 0.012, "oxygenation": 0.8, "oil": 0.6, "roughness": 0.3}
-# What one feature is shown on: even, bare skin, with the relief that any skin has.
+# What one feature is shown on: even, bare skin with the relief that any skin has, of somebody in whom it has grown.
 PLAIN = {"anatomy": 1.0, "relief": 1.0}
+PERSON = {"tone": "light", "age": 58, "seed": 4, "sun": 1.0}
 
 
 def shot_of(head: str, samples: int, **tables: object) -> Shot:
@@ -100,7 +101,8 @@ def main() -> None:
             if wanted and name not in wanted:
                 continue
             head = "male" if name == "beard" else "female"
-            shot = shot_of(head, options.samples, skin=BASE, effects={**PLAIN, **features})
+            effects = {**dict.fromkeys(every, 0.0), **PLAIN, **features}
+            shot = shot_of(head, options.samples, skin=BASE, effects=effects, person={**PERSON, "sex": head})
             made.append(render(renderer, shot, folder / f"{name}.png"))
         if made:
             sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_features.jpg", columns=6)
