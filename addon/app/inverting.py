@@ -1,6 +1,6 @@
 """The `invert` use-case: melanin, hemoglobin and oxygenation of every texel of a colour map.
 
-`invert_pixels` works on an array in memory, `invert_file` on files of any size, a band of rows at a time.
+`invert_tiles` works on arrays in memory, `invert_file` on files of any size, a band of rows at a time.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def inverse_for(
     return _inverse(tuple(skin_rows([mapped])[0]), working_space, nodes)
 
 
-def invert_pixels(
-    rgb: np.ndarray,
+def invert_tiles(
+    tiles: Mapping[int, np.ndarray],
     working_space: str | np.ndarray = "rec709",
     skin: Skin | None = None,
     *,
@@ -74,12 +74,12 @@ def invert_pixels(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Chromophores of a picture in memory.
+    """Chromophores of a picture in memory, which may be several tiles: noise, light and what is skin are found over all.
 
     Parameters
     ----------
-    rgb : (H, W, 3) or (H, W, 4) float32, scene linear in `working_space`; the fourth channel is alpha (straight). What is
-        not finite or has alpha 0 is not there.
+    tiles : UDIM tile (1001 for an ordinary picture) -> (H, W, 3) or (H, W, 4) float32, scene linear in `working_space`;
+        the fourth channel is alpha (straight). What is not finite or has alpha 0 is not there.
     skin : the other parameters of the skin, by default the schema's
     shading : "off", "auto" or "on": whether light in the picture is split off
     noise : standard deviation in L*a*b*; None estimates it
@@ -87,31 +87,43 @@ def invert_pixels(
 
     Returns
     -------
-    dict: skin_map (H, W, 4) float32: hemoglobin, melanin, oil (the skin's own), oxygenation, absolute and filled in where
-    there is no skin; residual (H, W, 3): picture / look of the skin_map, shading included; mask (H, W): probability of
-    skin; error (H, W): Delta E 2000 of the look to the picture without its shading; ranges: id -> (low, high) of the skin;
-    report: what `sanguine invert` says of one picture.
+    dict of tile -> array: skin_map (H, W, 4) float32: hemoglobin, melanin, oil (the skin's own), oxygenation, absolute and
+    filled in where there is no skin; residual (H, W, 3): picture / look of the skin_map, shading included; mask (H, W):
+    probability of skin; error (H, W): Delta E 2000 of the look to the picture without its shading. And over all tiles
+    ranges: id -> (low, high) of the skin; report: what `sanguine invert` says of one picture.
 
     Raises InputError for an array that is no picture.
     """
-    if rgb.ndim != 3 or rgb.shape[2] not in (3, 4) or rgb.size == 0:
-        raise InputError(f"picture: shape {rgb.shape}, needs rows x columns x 3 or 4 channels")
     start = time.perf_counter()
     skin = default_skin() if skin is None else skin
-    rgb = np.ascontiguousarray(rgb, dtype=np.float32)
     inverse = inverse_for(skin, working_space)
-    height, width = rgb.shape[:2]
-    overview = sanguine_core.PictureOverview(width, height)
-    overview.add(rgb, threads=threads)
-    model = sanguine_core.picture_models(inverse, [overview], shading, noise, quantum, threads)[0]
+    pictures, overviews = [], []
+    for tile, rgb in tiles.items():
+        if rgb.ndim != 3 or rgb.shape[2] not in (3, 4) or rgb.size == 0:
+            raise InputError(f"picture {tile}: shape {rgb.shape}, needs rows x columns x 3 or 4 channels")
+        pictures.append(np.ascontiguousarray(rgb, dtype=np.float32))
+        overviews.append(sanguine_core.PictureOverview(rgb.shape[1], rgb.shape[0]))
+        overviews[-1].add(pictures[-1], threads=threads)
+    models = sanguine_core.picture_models(inverse, overviews, shading, noise, quantum, threads)
     watch = None if progress is None else lambda done, total: progress("invert", done, total) is not False
-    made = sanguine_core.invert_rows(
-        inverse, model, rgb, 0, 0, height, shaded_residual=True, threads=threads, progress=watch
-    )
-    counts = made.pop("counts")
-    report = _numbers(counts) | _light(model) | {"seconds": time.perf_counter() - start}
+    counts = sanguine_core.InversionCounts()
+    made: dict[str, Any] = {}
+    for tile, rgb, model in zip(tiles, pictures, models, strict=True):
+        maps = sanguine_core.invert_rows(
+            inverse, model, rgb, 0, 0, rgb.shape[0], shaded_residual=True, threads=threads, progress=watch
+        )
+        counts += maps.pop("counts")
+        for name, image in maps.items():
+            made.setdefault(name, {})[tile] = image
+    report = _numbers(counts) | _light(models[0]) | {"seconds": time.perf_counter() - start}
     ranges = {key: (row["low"], row["high"]) for key, row in report["ranges"].items()}
     return made | {"ranges": ranges, "report": report}
+
+
+def invert_pixels(rgb: np.ndarray, *arguments: Any, **named: Any) -> dict[str, Any]:
+    """`invert_tiles` of one array, with arrays instead of tiles in the answer."""
+    made = invert_tiles({FIRST_TILE: rgb}, *arguments, **named)
+    return {name: found if name in ("ranges", "report") else found[FIRST_TILE] for name, found in made.items()}
 
 
 class _Picture:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..app.inverting import invert_pixels
+from ..app.inverting import invert_tiles
 from ..domain.effects import residual, skin_map
 from .colour import working_space
 from .images import data_image, scene_linear, store_range
@@ -18,9 +18,8 @@ def read_picture(face: bpy.types.Object, image: bpy.types.Image, shading: str = 
 
     Raises InputError for a picture that cannot be read.
     """
-    pixels = scene_linear(image)
-    made = invert_pixels(
-        pixels, working_space(), skin_of(face), shading=shading, quantum=0.0 if image.is_float else _BYTE
+    made = invert_tiles(
+        scene_linear(image), working_space(), skin_of(face), shading=shading, quantum=0.0 if image.is_float else _BYTE
     )
     before = [getattr(face.sanguine, name) for name in (skin_map.MAP, residual.MAP)]
     # Amounts take 32 bits: half floats round to 1 in 2000 of a fraction, which shows as bands where melanin is thin.

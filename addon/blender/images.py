@@ -82,8 +82,9 @@ def stored_range(image: bpy.types.Image) -> dict[str, Interval] | None:
     return {name: (values[0], values[1]) for name, values in held.items()} if held is not None else None
 
 
-def scene_linear(image: bpy.types.Image) -> np.ndarray:
-    """Pixels of a picture in the file's working space, linear: (H, W, 4) float32, row 0 lowest, alpha straight.
+def scene_linear(image: bpy.types.Image) -> dict[int, np.ndarray]:
+    """Pixels of a picture in the file's working space, linear: UDIM tile (1001 for an ordinary picture) -> (H, W, 4)
+    float32, row 0 lowest, alpha straight.
 
     What is painted and not saved is in it. Raises InputError for a picture without pixels or in a colour space that
     OpenColorIO cannot convert.
@@ -91,17 +92,47 @@ def scene_linear(image: bpy.types.Image) -> np.ndarray:
     width, height = image.size
     if not width * height or not image.channels:
         raise InputError(f"{image.name}: no pixels: the picture is empty or its file is missing")
-    pixels = np.empty((height, width, image.channels), dtype=np.float32)
-    image.pixels.foreach_get(pixels.ravel())
-    rgba = np.ones((height, width, 4), dtype=np.float32)
-    if image.channels < 3:
-        rgba[..., :3] = pixels[..., :1]
+    if image.source == "TILED":
+        tiles = _tiles(image)
     else:
-        rgba[..., : image.channels] = pixels
+        pixels = np.empty((height, width, image.channels), dtype=np.float32)
+        image.pixels.foreach_get(pixels.ravel())
+        tiles = {FIRST_TILE: pixels}
+    tiles = {tile: _with_alpha(pixels) for tile, pixels in tiles.items()}
     # Blender keeps pictures of bytes in their own encoding, and those of floats in the working space.
     if not image.is_float and not image.colorspace_settings.is_data:
-        _decode(image, rgba)
+        for rgba in tiles.values():
+            _decode(image, rgba)
+    return tiles
+
+
+def _with_alpha(pixels: np.ndarray) -> np.ndarray:
+    """(H, W, 1 to 4) -> (H, W, 4); of two channels the second is alpha."""
+    rgba = np.ones((*pixels.shape[:2], 4), dtype=np.float32)
+    if pixels.shape[2] < 3:
+        rgba[..., :3] = pixels[..., :1]
+        if pixels.shape[2] == 2:
+            rgba[..., 3] = pixels[..., 1]
+    else:
+        rgba[..., : pixels.shape[2]] = pixels
     return rgba
+
+
+def _tiles(image: bpy.types.Image) -> dict[int, np.ndarray]:
+    """By way of files, which are gone afterwards: Blender shows the pixels of the first tile alone."""
+    before = image.file_format
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            image.file_format = "OPEN_EXR" if image.is_float else "PNG"  # what loses nothing
+            suffix = ".exr" if image.is_float else ".png"
+            image.save(filepath=str(Path(folder) / f"tile.{_TILE}{suffix}"), save_copy=True)
+        except RuntimeError as error:
+            raise InputError(f"{image.name}: {' '.join(str(error).split())}") from None
+        finally:
+            image.file_format = before
+        return {
+            tile.number: sanguine_core.read_image(Path(folder) / f"tile.{tile.number}{suffix}") for tile in image.tiles
+        }
 
 
 def _decode(image: bpy.types.Image, rgba: np.ndarray) -> None:

@@ -17,25 +17,25 @@ def picture(**kind):
 
 
 def test_a_painted_picture_of_bytes_is_decoded():
-    pixels = scene_linear(picture())
+    pixels = scene_linear(picture())[1001]
     assert pixels.shape == (2, 3, 4)
     # Half a step of 8 bits, through the steepest part of the curve.
     np.testing.assert_allclose(pixels, np.broadcast_to(LINEAR, pixels.shape), atol=0.5 / 255 * 2.3)
 
 
 def test_a_picture_of_floats_is_linear_already():
-    np.testing.assert_allclose(scene_linear(picture(float_buffer=True))[0, 0], ENCODED, atol=1e-6)
+    np.testing.assert_allclose(scene_linear(picture(float_buffer=True))[1001][0, 0], ENCODED, atol=1e-6)
 
 
 def test_data_are_left_alone():
-    np.testing.assert_allclose(scene_linear(picture(is_data=True))[0, 0], ENCODED, atol=0.51 / 255)
+    np.testing.assert_allclose(scene_linear(picture(is_data=True))[1001][0, 0], ENCODED, atol=0.51 / 255)
 
 
 def test_a_packed_picture_reads_as_before():
     image = picture()
-    before = scene_linear(image)
+    before = scene_linear(image)[1001]
     image.pack()
-    np.testing.assert_array_equal(scene_linear(image), before)
+    np.testing.assert_array_equal(scene_linear(image)[1001], before)
 
 
 def test_a_missing_file_is_one_line(tmp_path):
@@ -44,3 +44,22 @@ def test_a_missing_file_is_one_line(tmp_path):
     image.filepath = str(tmp_path / "gone.png")
     with pytest.raises(InputError, match="^gone: no pixels"):
         scene_linear(image)
+
+
+@pytest.mark.parametrize("kind", [{}, {"float_buffer": True}, {"packed": True}])
+def test_every_tile_of_a_set_is_read(kind):
+    packed = kind.pop("packed", False)
+    image = bpy.data.images.new("set", 4, 4, tiled=True, **kind)
+    image.tiles.new(1012)
+    for tile, red in ((image.tiles[0], 0.2), (image.tiles[1], 0.8)):
+        image.tiles.active = tile
+        with bpy.context.temp_override(edit_image=image):
+            bpy.ops.image.tile_fill(color=(red, 0.5, 0.5, 1.0), width=4, height=4)
+    if packed:
+        image.pack()
+    before = image.file_format, image.filepath
+    tiles = scene_linear(image)
+    assert sorted(tiles) == [1001, 1012] and (image.file_format, image.filepath) == before
+    assert tiles[1001].shape == (4, 4, 4)
+    # The operator's colour goes to the picture's own encoding; bytes are decoded again to within their half step.
+    assert np.ptp(tiles[1001][..., 0]) == 0 and tiles[1001][0, 0, 0] < 0.25 < 0.5 < tiles[1012][0, 0, 0]
