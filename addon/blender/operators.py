@@ -6,11 +6,12 @@ import bpy
 
 from ..domain.effects import Frame, Scene
 from ..domain.facs import EMOTION_CONTROLS
+from ..domain.people import SEXES, TONES, person
 from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .material import MARK
-from .properties import growth_of, map_ranges_of, measure_maps, quality_of, skin_of, strengths_of
+from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
 
@@ -163,6 +164,41 @@ class SANGUINE_OT_read_picture(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SANGUINE_OT_draw_person(bpy.types.Operator):
+    bl_idname = "sanguine.draw_person"
+    bl_label = "Draw a Person"
+    bl_description = (
+        "Set the skin and what grows on it to those of an individual, drawn from measured faces of a tone. The panel's "
+        "individual, age and sun are taken"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    tone: bpy.props.EnumProperty(
+        name="Tone",
+        description="How light the face is; everything else is measured",
+        items=[(tone.id, tone.label, tone.help) for tone in TONES.values()],
+        default="intermediate",
+    )
+    sex: bpy.props.EnumProperty(
+        name="Sex", description="Of the measured people", items=[(name, name.capitalize(), "") for name in SEXES]
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _may_change(cls, active_face(context))
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        face = active_face(context)
+        growth = growth_of(face)
+        drawn = person(self.tone, self.sex, growth.age_years, growth.seed, growth.sun)
+        set_person(face, drawn)
+        self.report({"INFO"}, f"ITA {drawn.ita:.0f} degrees, {len(drawn.strengths)} effects. Apply the skin to see it")
+        return {"FINISHED"}
+
+
 def _new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Object:
     """An armature for the controls of a face that has none; it does not deform anything."""
     rig = bpy.data.objects.new(f"{face.name} controls", bpy.data.armatures.new(f"{face.name} controls"))
@@ -181,4 +217,4 @@ def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
     return rig.pose.bones.get(CONTROL_BONE) if rig is not None and rig.pose is not None else None
 
 
-CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture)
+CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, SANGUINE_OT_draw_person)

@@ -9,7 +9,7 @@ from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
-from .operators import SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, active_face, emotion_bone, live_plan
+from .operators import SANGUINE_OT_apply_skin, SANGUINE_OT_draw_person, SANGUINE_OT_read_picture, active_face, emotion_bone, live_plan
 from .properties import strength_property
 
 
@@ -80,6 +80,8 @@ class SANGUINE_PT_features(_FacePanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         settings = active_face(context).sanguine
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator(SANGUINE_OT_draw_person.bl_idname, icon="USER")
         column = layout.column(align=True)
         for name in Growth.__dataclass_fields__:
             column.prop(settings, name)

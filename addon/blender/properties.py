@@ -7,7 +7,8 @@ import bpy
 from ..domain.effects import EFFECTS, Growth, residual, skin_map
 from ..domain.effects.effect import Interval
 from ..domain.parameters import PARAMETERS
-from ..domain.people import AGES, SEEDS
+from ..domain.people import AGES, SEEDS, Person
+from ..domain.plan import default_strengths
 from ..domain.quality import DEFAULT, PRESETS, Settings, preset
 from .images import measure_range, stored_range
 
@@ -76,6 +77,16 @@ def _growth_properties() -> dict[str, object]:
 
 def growth_of(obj: bpy.types.Object) -> Growth:
     return Growth(**{name: getattr(obj.sanguine, name) for name in Growth.__dataclass_fields__})
+
+
+def set_person(obj: bpy.types.Object, person: Person) -> None:
+    """The properties of an individual: skin, strengths (the default of those that it has not) and growth."""
+    for key, value in person.skin.items():
+        setattr(obj.sanguine, key, value)
+    for key, value in (default_strengths() | dict(person.strengths)).items():
+        setattr(obj.sanguine, strength_property(key), value)
+    for key in Growth.__dataclass_fields__:
+        setattr(obj.sanguine, key, getattr(person.growth, key))
 
 
 def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

@@ -8,6 +8,7 @@ from sanguine.app.skin_report import report
 from sanguine.blender.images import stored_range
 from sanguine.blender.operators import albedo_of
 from sanguine.domain.parameters import default_skin
+from sanguine.domain.people import person
 from support.patch import camera_above, empty_scene, plane, render_linear, white_world
 
 PALE = {"melanin": 0.015, "hemoglobin": 0.008, "oxygenation": 0.75}
@@ -121,3 +122,15 @@ def test_without_a_picture_it_says_so():
         bpy.ops.sanguine.read_picture()
     with pytest.raises(RuntimeError, match="no picture 'x'"):
         bpy.ops.sanguine.read_picture(image="x")
+
+
+def test_a_person_sets_skin_features_and_growth():
+    face = flat_face(None)
+    face.sanguine.seed, face.sanguine.age_years = 7, 61.0
+    face.sanguine.strength_tattoo = 1.0
+    assert bpy.ops.sanguine.draw_person(tone="monk-3", sex="male") == {"FINISHED"}
+    drawn = person("monk-3", "male", 61.0, 7, 0.5)
+    assert face.sanguine.melanin == pytest.approx(drawn.skin["melanin"])
+    assert face.sanguine.strength_lentigines == pytest.approx(drawn.strengths.get("lentigines", 0.0))
+    assert face.sanguine.strength_tattoo == pytest.approx(drawn.strengths.get("tattoo", 0.0))
+    assert face.sanguine.masculinity == 1.0 and face.sanguine.seed == 7
