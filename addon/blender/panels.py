@@ -9,7 +9,14 @@ from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
-from .operators import SANGUINE_OT_apply_skin, SANGUINE_OT_draw_person, SANGUINE_OT_read_picture, active_face, emotion_bone, live_plan
+from .operators import (
+    SANGUINE_OT_apply_skin,
+    SANGUINE_OT_draw_person,
+    SANGUINE_OT_read_picture,
+    active_face,
+    emotion_bone,
+    live_plan,
+)
 from .properties import strength_property
 
 
