@@ -2,7 +2,7 @@
 
     python bench/feature_pictures.py [--out docs] [--only freckles,times] [--samples 64]
 
-Writes maps_features.jpg, a contact sheet of rendered heads, and the table in docs/maps.md.
+Writes maps_features.jpg, a contact sheet of rendered heads, and the tables in docs/maps.md.
 """
 
 from __future__ import annotations
@@ -15,12 +15,20 @@ import time
 from pathlib import Path
 
 import bpy
+import numpy as np
 import sanguine_core
 from sanguine.app.faces import example_head, head_surface
+from sanguine.app.map_cache import MapCache
+from sanguine.app.maps import Grown
 from sanguine.blender.render import BlenderRenderer
+from sanguine.domain.effects import Growth
+from sanguine.domain.effects.grown import MAPS
+from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
 from sanguine.domain.plan import make_plan
 from sanguine.domain.shot import Shot, scene_of
+from sanguine.domain.texel_density import mm_per_uv
 
+PLACES = 20_000
 WIDTH, HEIGHT, YAW = 640, 800, -22.0
 # Of the picture, from the left and from below: the face, where skin is to be judged.
 FACE = (0.18, 0.72, 0.27, 0.84)
@@ -66,20 +74,75 @@ def times(size: int = 2048) -> dict[str, float]:
     return made
 
 
-def write_table(page: Path) -> None:
-    """The features between the marks of docs/maps.md."""
+def sizes(of: tuple[int, ...] = (256, 512, 1024, 2048, 4096)) -> list[dict[str, float]]:
+    """What a size costs and what it loses: all features at full strength, against the largest map at places of the face.
+
+    Delta E 2000 of the colour of the skin there, seconds from nothing to the map, megabytes of the map.
+    """
+    face = head_surface(example_head("female"))
+    growth = Growth(seed=1, age_years=45.0, sun=0.7, masculinity=0.0)
+    strengths = dict.fromkeys((row["id"] for row in sanguine_core.features()), 1.0)
+    mm = mm_per_uv(face.position_mm, face.uv, face.triangles, face.corner_vertex)
+    found = []
+    for size in of:
+        start = time.perf_counter()
+        image = Grown(face, growth, size, MapCache(None)).compose(strengths, MAPS["grown"])
+        found.append({"size": size, "mm": mm / size, "seconds": time.perf_counter() - start, "image": image})
+    skin = np.tile(skin_rows([default_skin()]), (PLACES, 1))
+    visible = np.concatenate([face.regions[r][:, None] for r in ("cheeks", "nose", "forehead", "chin")], axis=1).sum(axis=1)
+    triangles = face.triangles[visible[face.corner_vertex[face.triangles]].min(axis=1) > 0.5]
+    random = np.random.default_rng(0)
+    chosen = triangles[random.integers(len(triangles), size=PLACES)]
+    weights = random.dirichlet((1, 1, 1), PLACES)
+    uv = np.einsum("nk,nkc->nc", weights, face.uv[chosen])
+    labs = []
+    for row in found:
+        change = look_up(row.pop("image"), uv)
+        rows = skin.copy()
+        for channel, value in zip(MAPS["grown"], change.T, strict=True):
+            name = channel.removeprefix("log_")
+            column = list(PARAMETERS).index(name)
+            value = rows[:, column] * np.exp(value) if name != channel else rows[:, column] + value
+            rows[:, column] = np.clip(value, PARAMETERS[name].hard_min, PARAMETERS[name].hard_max)
+        nm = np.arange(400.0, 701.0, 10.0)
+        labs.append(sanguine_core.lab(sanguine_core.xyz(sanguine_core.reflectance(rows, nm), nm)))
+    for row, lab in zip(found, labs, strict=True):
+        apart = sanguine_core.delta_e_2000(lab, labs[-1])
+        row |= {"median": float(np.median(apart)), "p95": float(np.quantile(apart, 0.95))}
+    return found
+
+
+def look_up(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear, as a renderer reads it."""
+    at = uv * image.shape[0] - 0.5
+    x, y = np.clip(np.floor(at).astype(int).T, 0, image.shape[0] - 2)
+    fx, fy = (at - np.stack([x, y], axis=1)).T[..., None]
+    return (image[y, x] * (1 - fx) + image[y, x + 1] * fx) * (1 - fy) + (image[y + 1, x] * (1 - fx) + image[y + 1, x + 1] * fx) * fy
+
+
+def write_tables(page: Path) -> None:
+    """The features, and what a size costs, between the marks of docs/maps.md."""
     seconds = times()
-    lines = ["| feature | is | changes, at strength 1 | seconds at 2048 x 2048 |", "|---|---|---|---|"]
+    features = ["| feature | is | changes, at strength 1 | seconds at 2048 x 2048 |", "|---|---|---|---|"]
     for row in sanguine_core.features():
         changes = ", ".join(f"`{c['channel']}` {c['low']:.2g} to {c['high']:.2g}" for c in row["changes"])
-        lines.append(f"| `{row['id']}` | {row['help']} | {changes} | {seconds[row['id']]:.2f} |")
-    total = sum(seconds.values())
-    lines += ["", f"All of them: {total:.1f} s on {os.cpu_count()} cores, {seconds['texels']:.1f} s of it to find the places of the "
-              "texels (male, 45 years, sun 0.7). Sources of sizes and numbers: `sanguine maps female --out-dir . --features list`."]
+        features.append(f"| `{row['id']}` | {row['help']} | {changes} | {seconds[row['id']]:.2f} |")
+    features += [
+        "",
+        f"All of them: {sum(seconds.values()):.1f} s on {os.cpu_count()} cores, {seconds['texels']:.1f} s of it to find the "
+        "places of the texels (45 years, sun 0.7, male). Sources of sizes and numbers: `sanguine maps female --out-dir . "
+        "--features list`.",
+    ]
+    cost = ["| texels a side | mm per texel | seconds, all features | Delta E 2000 median | 95 % |", "|---|---|---|---|---|"]
+    cost += [
+        f"| {r['size']} | {r['mm']:.2f} | {r['seconds']:.1f} | {r['median']:.2f} | {r['p95']:.2f} |" for r in sizes()
+    ]
     text = page.read_text(encoding="utf-8")
-    head, rest = text.split("<!-- features -->")
-    tail = rest.split("<!-- /features -->")[1]
-    page.write_text(head + "<!-- features -->\n" + "\n".join(lines) + "\n<!-- /features -->" + tail, encoding="utf-8")
+    for mark, lines in (("features", features), ("sizes", cost)):
+        head, rest = text.split(f"<!-- {mark} -->")
+        tail = rest.split(f"<!-- /{mark} -->")[1]
+        text = head + f"<!-- {mark} -->\n" + "\n".join(lines) + f"\n<!-- /{mark} -->" + tail
+    page.write_text(text, encoding="utf-8")
 
 
 def main() -> None:
@@ -107,7 +170,7 @@ def main() -> None:
         if made:
             sanguine_core.contact_sheet(made, [path.stem for path in made], options.out / "maps_features.jpg", columns=6)
         if not wanted or "times" in wanted:
-            write_table(options.out / "maps.md")
+            write_tables(options.out / "maps.md")
 
 
 if __name__ == "__main__":
