@@ -15,9 +15,9 @@ SMALLEST_SIZE = 64
 LARGEST_DETAIL = 4096
 DETAIL_WITHOUT_CAMERA = 2048
 
-# Share of the surface (by area) that gets at least one texel per pixel. The rest is where a UV layout crams skin
-# together: the back of the ears, the rim of the neck.
-_SERVED_SHARE = 0.9
+# Share of the surface (by area) that gets a texel per pixel even where the camera is nearest. The rest is where a UV layout
+# crams skin together (the neck, the back of the ears), mostly farther from the camera or turned away from it.
+_SERVED_SHARE = 0.6
 
 
 def mm_per_uv(position_mm: np.ndarray, uv: np.ndarray, triangles: np.ndarray, corner_vertex: np.ndarray) -> float:
@@ -47,7 +47,7 @@ class MapSizes:
 
 
 def map_sizes(span_mm: float, pixel_mm: float | None, settings: Settings) -> MapSizes:
-    """Sizes of the maps of one UV tile, powers of two.
+    """Sizes of the maps of one UV tile, powers of the root of two (a camera that moves a little asks for the same).
 
     span_mm: of `mm_per_uv`. pixel_mm: what one pixel covers on the skin where the camera is nearest; None when no
     camera is known. Smooth maps have at most the size that the quality was measured with; details get a texel per pixel
@@ -62,5 +62,5 @@ def map_sizes(span_mm: float, pixel_mm: float | None, settings: Settings) -> Map
 def _bounded(span_mm: float, texel_mm: float | None, largest: int) -> int:
     if texel_mm is None or not texel_mm > 0.0 or not span_mm > 0.0:
         return largest
-    wanted = 2 ** math.ceil(math.log2(max(span_mm / texel_mm, 1.0)))
+    wanted = round(2.0 ** (math.ceil(2.0 * math.log2(max(span_mm / texel_mm, 1.0))) / 2.0))
     return max(min(wanted, largest), min(SMALLEST_SIZE, largest))

@@ -41,9 +41,10 @@ def test_a_crammed_tenth_does_not_decide():
 FINAL, DRAFT = PRESETS["final"].settings, PRESETS["draft"].settings
 
 
-def test_details_have_a_texel_per_pixel_in_powers_of_two():
+def test_details_have_a_texel_per_pixel_in_powers_of_root_two():
     assert map_sizes(200.0, 0.2, FINAL).detail == 1024  # 1000 texels
-    assert map_sizes(200.0, 0.19, FINAL).detail == 2048
+    assert map_sizes(200.0, 0.19, FINAL).detail == 1448
+    assert map_sizes(200.0, 0.12, FINAL).detail == 2048
     assert map_sizes(200.0, 0.001, FINAL).detail == LARGEST_DETAIL
     assert map_sizes(200.0, 50.0, FINAL).detail == SMALLEST_SIZE
     assert map_sizes(200.0, None, FINAL).detail == DETAIL_WITHOUT_CAMERA
