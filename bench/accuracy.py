@@ -33,7 +33,7 @@ import sanguine_core
 from accuracy_truth import Case, Colours, SkinTotals, reference_cases
 from sanguine.domain.lut import entry_skins
 from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
-from sanguine.domain.plan import Axis, _axis
+from sanguine.domain.plan import Axis, spaced
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -360,7 +360,7 @@ def lut_ladder(quick: bool) -> list[dict[str, Any]]:
         octaves = math.log2(high / low)
         exact = _lobes(Axis(name, low, high, 2, True), skin, values=low * (high / low) ** places)
         floor = np.median(exact["fit_error"].max(1))
-        planned = _axis(name, low, high, table_step=1.0).count
+        planned = spaced(name, low, high, table_step=1.0).count
         for count in sorted({*(int(octaves * per) + 1 for per in ((1, 4) if quick else (0.5, 1, 2, 4, 8))), planned}):
             axis = Axis(name, low, high, count, True)
             entries, seconds, _ = timed(lambda axis=axis: _lobes(axis, skin), 0)

@@ -116,29 +116,41 @@ class Grown:
         """(N,) uint32: row * size + column of the texels that the layers have values for."""
         return self.cache.get(key_of(self.key, "texel"), lambda: np.asarray(self._texels.texel))
 
-    def layer(self, feature: str) -> np.ndarray:
+    def layer(self, feature: str, progress: Progress | None = None) -> np.ndarray:
         """(N, C) float16, channels in the order of the feature's row. Half is what the material's maps hold too."""
 
         def paint() -> np.ndarray:
             growth = self.growth
             return sanguine_core.grow(
                 feature, self._native, self._texels, growth.seed, growth.age_years, growth.sun, growth.masculinity,
-                progress=self.progress,
+                progress=progress,
             ).astype(np.float16)
 
         return self.cache.get(key_of(self.key, feature), paint)
 
+    def _part(self, done: int, total: int) -> Progress | None:
+        """The progress of one feature as part of all, in thousandths; asked before each, however quick it is."""
+        if self.progress is None:
+            return None
+
+        def part(texels: int, of: int) -> bool:
+            return self.progress(1000 * done + 1000 * texels // of, 1000 * total)
+
+        if not part(0, 1):
+            raise sanguine_core.Cancelled("cancelled")
+        return part
+
     def compose(self, strengths: Mapping[str, float], channels: tuple[str, ...]) -> np.ndarray:
         """(size, size, C) float32: the sum of strength x layer; 0 where there is no skin."""
         total = np.zeros((len(self.texel), len(channels)), dtype=np.float32)
-        for row in sanguine_core.features():
-            held = [change["channel"] for change in row["changes"]]
-            if strengths.get(row["id"], 0.0) <= 0.0 or not set(held) & set(channels):
-                continue
-            layer = self.layer(row["id"])
+        held_by = {row["id"]: [change["channel"] for change in row["changes"]] for row in sanguine_core.features()}
+        wanted = [name for name, held in held_by.items() if strengths.get(name, 0.0) > 0.0 and set(held) & set(channels)]
+        for done, name in enumerate(wanted):
+            layer = self.layer(name, self._part(done, len(wanted)))
+            held = held_by[name]
             for i, channel in enumerate(held):
                 if channel in channels:
-                    total[:, channels.index(channel)] += np.float32(strengths[row["id"]]) * layer[:, i]
+                    total[:, channels.index(channel)] += np.float32(strengths[name]) * layer[:, i]
         image = np.zeros((self.size * self.size, len(channels)), dtype=np.float32)
         image[self.texel] = total
         return image.reshape(self.size, self.size, len(channels))

@@ -134,7 +134,9 @@ def test_where_no_skin_is_the_maps_hold_the_skin_as_a_whole(face):
     assert {name: pytest.approx(skin[name], rel=1e-6) for name in channels} == corner
 
 
-def test_progress_can_stop_it(face):
-    # It is asked a few times a second, so there must be seconds of work.
+def test_progress_is_told_and_can_stop_it(face):
+    said = []
+    bake_maps(plan_of(face, freckles=1.0, lentigines=1.0), face, SIZES, MapCache(None), lambda *now: said.append(now) or True)
+    assert said == sorted(said) and said[0] == (0, 2000) and said[-1][0] <= 2000
     with pytest.raises(sanguine_core.Cancelled):
-        bake_maps(plan_of(face, **dict.fromkeys(ROWS, 1.0)), face, MapSizes(1024, 1024), MapCache(None), lambda done, total: False)
+        bake_maps(plan_of(face, freckles=1.0), face, SIZES, MapCache(None), lambda done, total: False)
