@@ -26,7 +26,7 @@ from ..domain.uv_checks import uv_warnings
 from .faces import example_head, head_surface
 from .map_cache import MapCache
 from .map_files import MapHeader, write_maps
-from .maps import Progress, Surface, bake_maps
+from .maps import Progress, Surface, bake_maps, hide_seams
 from .skin_report import read_skins
 from .spectral import write_spectral
 
@@ -140,6 +140,8 @@ def chromophore_maps(
         held = {name: images[tile] for name, images in maps.items()}
         image = np.stack([np.broadcast_to(column, (size, size)) for column in _columns(plan, held)], axis=2)
         tiles[tile] = np.concatenate([image, *(held[name] for name in beside)], axis=2).astype(np.float32)
+    # The logarithms are alike there; what is between two texels of their exponentials need not be.
+    hide_seams(surface, tiles, cache)
     return channels, tiles
 
 

@@ -6,6 +6,7 @@ cache holds: a layer is kept by the face, the feature and the person, so a chang
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -75,6 +76,13 @@ class Surface:
         return np.stack(columns, axis=1) if columns else np.zeros((len(self.position_mm), 0), dtype=np.float32)
 
     @cached_property
+    def native(self) -> sanguine_core.SkinSurface:
+        """The face as the core walks on it."""
+        return sanguine_core.SkinSurface(
+            self.position_mm, self.uv, self.triangles, self.corner_vertex, list(self.regions), self.region_weights
+        )
+
+    @cached_property
     def digest(self) -> str:
         return key_of(
             self.position_mm, self.uv, self.triangles, self.corner_vertex, list(self.regions), self.region_weights
@@ -101,15 +109,8 @@ class Grown:
         self.key = key_of(surface.digest, asdict(growth), size, _PADDING)
 
     @cached_property
-    def _native(self) -> sanguine_core.SkinSurface:
-        face = self.surface
-        return sanguine_core.SkinSurface(
-            face.position_mm, face.uv, face.triangles, face.corner_vertex, list(face.regions), face.region_weights
-        )
-
-    @cached_property
     def _texels(self) -> sanguine_core.TexelMap:
-        return self._native.texels(self.size, self.size, _PADDING)
+        return self.surface.native.texels(self.size, self.size, _PADDING)
 
     @cached_property
     def texel(self) -> np.ndarray:
@@ -122,7 +123,7 @@ class Grown:
         def paint() -> np.ndarray:
             growth = self.growth
             return sanguine_core.grow(
-                feature, self._native, self._texels, growth.seed, growth.age_years, growth.sun, growth.masculinity,
+                feature, self.surface.native, self._texels, growth.seed, growth.age_years, growth.sun, growth.masculinity,
                 progress=progress,
             ).astype(np.float16)
 
@@ -159,7 +160,7 @@ class Grown:
 def bake_maps(
     plan: Plan, surface: Surface, sizes: MapSizes, cache: MapCache | None = None, progress: Progress | None = None
 ) -> dict[str, dict[int, np.ndarray]]:
-    """The maps that a plan makes from the face itself; nothing unasked for.
+    """The maps that a plan makes from the face itself, alike on both sides of its UV seams; nothing unasked for.
 
     Returns map id -> UDIM tile -> square (H, W, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`,
     called with what is done and what there is to do, answers False.
@@ -171,7 +172,31 @@ def bake_maps(
         for name in plan.maps:
             if (image := _bake(name, plan, layers, sizes.smooth)) is not None:
                 made.setdefault(name, {})[tile] = image
+    for images in made.values():
+        hide_seams(surface, images, cache)
     return made
+
+
+def hide_seams(surface: Surface, images: Mapping[int, np.ndarray], cache: MapCache) -> None:
+    """Changes the texels of one map that look-ups on UV seams read until both sides are read alike, in place.
+
+    images: UDIM tile -> square (H, W, C) float32, of every tile of the face. A value that is exactly right at each texel
+    is not enough: where it changes within the width of a texel, look-ups between two grids of texels differ.
+    """
+    size = next(iter(images.values())).shape[0]
+
+    @functools.cache
+    def seams() -> sanguine_core.SeamTexels:
+        return sanguine_core.SeamTexels(surface.native, size, size, [tile_offset(tile) for tile in images])
+
+    key = key_of(surface.digest, "seams", size, list(images))
+    where = cache.get(key, lambda: np.stack([seams().tile, seams().texel], axis=1))
+    texels = [where[where[:, 0] == i, 1] for i in range(len(images))]
+    flat = [image.reshape(size * size, -1) for image in images.values()]
+    read = np.concatenate([values[texel] for values, texel in zip(flat, texels, strict=True)])
+    alike = cache.get(key_of(key, read), lambda: seams().equalize(read))
+    for i, (values, texel) in enumerate(zip(flat, texels, strict=True)):
+        values[texel] = alike[where[:, 0] == i]
 
 
 def reached(plan: Plan, images: Mapping[str, np.ndarray | Mapping[int, np.ndarray]]) -> Plan:

@@ -1,11 +1,13 @@
 // The surface of a face and the features that grow on it.
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
@@ -14,6 +16,7 @@
 #include "counters.hpp"
 #include "sanguine/feature.hpp"
 #include "sanguine/image.hpp"
+#include "sanguine/seams.hpp"
 #include "sanguine/skin_surface.hpp"
 
 namespace nb = nanobind;
@@ -82,6 +85,35 @@ LayerOut grow(const std::string& id, const sanguine::SkinSurface& surface, const
     float* values = layer->data();
     nb::capsule owner(layer.release(), [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
     return LayerOut(values, {map.place.size(), channels}, owner);
+}
+
+void make_seams(sanguine::SeamTexels* self, const sanguine::SkinSurface& surface, int width, int height,
+                const std::vector<std::pair<int, int>>& tiles) {
+    if (width < 1 || height < 1 || width > sanguine::max_image_side || height > sanguine::max_image_side)
+        throw std::invalid_argument("seam texels: width and height are allowed from 1 to 16384");
+    nb::gil_scoped_release release;
+    std::vector<glm::ivec2> corners;
+    for (const auto& [u, v] : tiles) corners.emplace_back(u, v);
+    new (self) sanguine::SeamTexels(surface, width, height, corners);
+}
+
+template <typename Member> View<std::uint32_t, OfEach> of_texels(nb::handle self, Member member_of) {
+    const auto texels = nb::cast<const sanguine::SeamTexels&>(self).texels();
+    const std::size_t count = texels.size();
+    const std::int64_t stride = sizeof(sanguine::SeamTexel) / sizeof(std::uint32_t);
+    return View<std::uint32_t, OfEach>(count ? &(texels[0].*member_of) : nullptr, 1, &count, self, &stride);
+}
+
+LayerOut equalize(const sanguine::SeamTexels& seams, const WeightsIn& values, int threads) {
+    auto alike = std::make_unique<std::vector<float>>(values.data(), values.data() + values.size());
+    const std::size_t count = values.shape(0), channels = values.shape(1);
+    {
+        nb::gil_scoped_release release;
+        seams.equalize(*alike, int(channels), threads);
+    }
+    float* data = alike->data();
+    nb::capsule owner(alike.release(), [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+    return LayerOut(data, {count, channels}, owner);
 }
 
 nb::list feature_rows() {
@@ -174,6 +206,32 @@ weights outside 0 to 1 and a mesh without area.)")
              R"(The texels that show skin or lie within `padding_px` of it (with the nearest place of the skin).
 
 `width` and `height` are allowed from 1 to 16384; `threads` = 0 uses every core and changes nothing in the result.)");
+
+    nb::class_<sanguine::SeamTexels>(m, "SeamTexels", R"(The texels that look-ups on UV seams read, N of them.
+
+Parameters
+----------
+surface : SkinSurface
+width, height : texels of an image, 1 to 16384
+tiles : lower left corners in UV of the images that there are
+
+Notes
+-----
+A bilinear look-up at a side that two triangles share reads other texels on each of its two places in UV. `equalize`
+changes these texels, as little as that takes, until both read alike. Beyond the border of an image a look-up reads the
+border. Liu et al. 2017, "Seamless: Seam Erasure and Seam-Aware Decoupling of Shape from Mesh Resolution".)")
+        .def("__init__", &make_seams, "surface"_a, "width"_a, "height"_a, "tiles"_a = nb::make_tuple(nb::make_tuple(0, 0)))
+        .def_prop_ro(
+            "tile", [](nb::handle self) { return of_texels(self, &sanguine::SeamTexel::tile); },
+            "(N,) uint32: index of the image in `tiles`; ascending.")
+        .def_prop_ro(
+            "texel", [](nb::handle self) { return of_texels(self, &sanguine::SeamTexel::texel); },
+            "(N,) uint32: row * width + column, row 0 being the bottom row (V = 0); ascending in each image.")
+        .def("equalize", &equalize, "values"_a, "threads"_a = 0,
+             R"(Values (N, C) float32 that read alike on both sides of every seam, from those of the maps as they are.
+
+Returns (N, C) float32. Each channel stays in the range that it has in `values`; `threads` = 0 uses every core and
+changes nothing in the result. Raises ValueError for another shape and for values that are not finite.)");
 
     m.def("features", &feature_rows,
           R"(Every feature that grows on a face: dicts with id, label, help, source and changes.

@@ -558,6 +558,43 @@ class SkinSurface:
         `width` and `height` are allowed from 1 to 16384; `threads` = 0 uses every core and changes nothing in the result.
         """
 
+class SeamTexels:
+    """
+    The texels that look-ups on UV seams read, N of them.
+
+    Parameters
+    ----------
+    surface : SkinSurface
+    width, height : texels of an image, 1 to 16384
+    tiles : lower left corners in UV of the images that there are
+
+    Notes
+    -----
+    A bilinear look-up at a side that two triangles share reads other texels on each of its two places in UV. `equalize`
+    changes these texels, as little as that takes, until both read alike. Beyond the border of an image a look-up reads the
+    border. Liu et al. 2017, "Seamless: Seam Erasure and Seam-Aware Decoupling of Shape from Mesh Resolution".
+    """
+
+    def __init__(self, surface: SkinSurface, width: int, height: int, tiles: Sequence[tuple[int, int]] = ((0, 0))) -> None: ...
+
+    @property
+    def tile(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+        """(N,) uint32: index of the image in `tiles`; ascending."""
+
+    @property
+    def texel(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+        """
+        (N,) uint32: row * width + column, row 0 being the bottom row (V = 0); ascending in each image.
+        """
+
+    def equalize(self, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], threads: int = 0) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """
+        Values (N, C) float32 that read alike on both sides of every seam, from those of the maps as they are.
+
+        Returns (N, C) float32. Each channel stays in the range that it has in `values`; `threads` = 0 uses every core and
+        changes nothing in the result. Raises ValueError for another shape and for values that are not finite.
+        """
+
 def features() -> list:
     """
     Every feature that grows on a face: dicts with id, label, help, source and changes.
