@@ -23,7 +23,7 @@ from sanguine.domain.parameters import skin_from
 from sanguine.domain.shot import read_shot
 
 # Of the layout, in shares from the left and from below: the face, which lies on its side.
-FACE = (0.70, 0.99, 0.28, 0.66)
+FACE = (0.72, 0.97, 0.37, 0.60)
 SIDE = 500
 SKIN = {"epidermis_thickness_mm": 0.05, "oil": 0.6, "roughness": 0.3}
 SHOT = """
@@ -51,7 +51,7 @@ def face_of(image: np.ndarray) -> np.ndarray:
     """The face cut out of an image in the layout, upright, (SIDE, W, 3) of 0 to 1."""
     height, width = image.shape[:2]
     left, right, low, high = (round(share * side) for share, side in zip(FACE, (width, width, height, height), strict=True))
-    upright = np.rot90(image[low:high, left:right], -1) if image.ndim == 3 else np.rot90(image[low:high, left:right, None], -1)
+    upright = np.rot90(image.reshape(height, width, -1)[low:high, left:right])
     scale = SIDE / upright.shape[0]
     rows, columns = ((np.arange(round(n * scale)) / scale).astype(int) for n in upright.shape[:2])
     picture = upright[rows][:, columns]
@@ -74,8 +74,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         # The picture is all there is to see: no film of oil takes light from it.
-        report = invert_file(options.albedo, folder, skin=skin_from({**SKIN, "oil": 0.0}, "skin"), shading="off")
-        print(json.dumps(report["delta_e_2000"] if "delta_e_2000" in report else report, indent=1))
+        report = invert_file(options.albedo, folder, skin=skin_from({**SKIN, "oil": 0.0}, "skin"))
+        print(json.dumps(report, indent=1))
         maps = read_maps(folder / "chromophores.exr")
         held = dict(zip(maps.channels, np.moveaxis(maps.tiles[1001], 2, 0), strict=True))
         pictures = {

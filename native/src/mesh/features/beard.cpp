@@ -14,7 +14,7 @@ namespace sanguine {
 namespace {
 
 constexpr float darkest = 1.6F;
-constexpr float most_ink_per_mm = 0.2F;
+constexpr float most_ink_per_mm = 0.07F;
 
 class Grown final : public GrownFeature {
 public:
@@ -42,7 +42,7 @@ public:
             const float moustache = 0.42F - 1.6F * std::max(0.0F, out - 0.28F);
             const float cheek = -0.1F + 0.75F * smooth_step(0.3F, 1.25F, back + 0.35F * out);
             const float top = std::max(moustache, cheek);
-            float density = 1 - smooth_step(-0.2F, 0.14F, up - top);
+            float density = 1 - smooth_step(-0.35F, 0.2F, up - top);
             density *= smooth_step(-1.15F, -0.75F, up);             // down to the larynx
             density *= 1 - smooth_step(1.25F, 1.5F, back - 0.1F * up);  // not behind the ears
             // Thickest on chin and lip, thinner on cheek and throat.
@@ -61,7 +61,7 @@ public:
     void paint(std::span<const SkinPlace> places, std::span<float> out) const override {
         for (std::size_t i = 0; i < places.size(); ++i) {
             const float root = surface_.value_at(places[i].point, roots_);
-            out[2 * i] = root == 0 ? 0 : std::min(darkest, 0.15F * root + dots_(places[i], places[i].place_mm));
+            out[2 * i] = root == 0 ? 0 : std::min(darkest, 0.25F * root + dots_(places[i], places[i].place_mm));
             out[2 * i + 1] = most_ink_per_mm * std::min(1.0F, root);
         }
     }
