@@ -57,6 +57,8 @@ bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour
 	$(PY) bench/measured_skin.py
 	$(PY) bench/inversion.py
 	$(PY) bench/measured_people.py
+	$(PY) bench/strain.py
+	$(PY) bench/feature_pictures.py --only times
 	$(PY) bench/picture.py
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing

@@ -67,14 +67,14 @@ def feature_list() -> dict[str, Any]:
 
 def grow_maps(
     face: str,
-    read_mesh: Callable[[str], Surface],
+    read_mesh: Callable[[str], tuple[Surface, str]],
     out_dir: str | os.PathLike[str],
     request: Request,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Grows the maps of a head of ours, of a mesh file or of the subjects of a shot, and writes them into `out_dir`.
 
-    Several subjects get a folder each. Returns the report; raises InputError, one line that names what is wrong.
+    read_mesh: of a file, the surface and a remark on its regions. Several subjects get a folder each. Returns the report; raises InputError, one line that names what is wrong.
     """
     if not SIZES[0] <= request.size <= SIZES[1]:
         raise InputError(f"--size: {request.size} is outside {SIZES[0]} to {SIZES[1]}")
@@ -82,16 +82,17 @@ def grow_maps(
     if face.endswith(".toml"):
         return _grow_shot(face, out_dir, request, cache, progress)
     heads = load_presets(rigs_path("heads.toml"))
-    surface = head_surface(example_head(face)) if face in heads else read_mesh(face)
+    surface, said = (head_surface(example_head(face)), "") if face in heads else read_mesh(face)
     someone = person(request.tone or "intermediate", request.sex, request.age_years, request.seed, request.sun)
     skin, strengths = (someone.skin, someone.strengths) if request.tone else (default_skin(), {})
     if request.skin_path:
         skin = read_skins(request.skin_path)[1][0]
     strengths = check_strengths({**strengths, **_expand(request.features)}, "--features")
     plan = maps_plan(skin, strengths, surface, someone.growth)
-    return write_chromophores(
+    report = write_chromophores(
         plan, surface, out_dir, request.size, cache, progress, request.spectral_nm, request.tx
     )
+    return report | {"warnings": [said, *report["warnings"]] if said else report["warnings"]}
 
 
 def _grow_shot(

@@ -11,7 +11,7 @@ import bpy
 from ..app.maps import Surface
 from ..domain.errors import InputError, nearest
 from .render import quiet
-from .surface import read_surface
+from .surface import find_face_regions, read_surface
 
 MAX_FILE_BYTES = 2 * 1024**3
 
@@ -45,8 +45,10 @@ SUFFIXES = tuple(_READERS)
 METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
-def read_mesh(path: str | os.PathLike[str], name: str | None = None, unit: str = "m") -> Surface:
-    """The mesh of a file as maps need it: the object `name`, or the one with the most faces.
+def read_mesh(path: str | os.PathLike[str], name: str | None = None, unit: str = "m") -> tuple[Surface, str]:
+    """The mesh of a file as maps need it, and what came of looking for its regions, one line or "".
+
+    The object `name`, or the one with the most faces. Regions are its vertex groups or else what its shape keys tell.
 
     unit: of the lengths as Blender's importer gives them, a key of METRES. Empties the open scene. Raises InputError for a file
     that is missing, too large, not a mesh or without a UV map.
@@ -74,4 +76,6 @@ def read_mesh(path: str | os.PathLike[str], name: str | None = None, unit: str =
     if name is not None and name not in meshes:
         raise InputError(f"{path}: no mesh '{name}', {nearest(name, meshes)}")
     bpy.context.scene.unit_settings.scale_length = METRES[unit]
-    return read_surface(meshes[name] if name else max(meshes.values(), key=lambda obj: len(obj.data.polygons)))
+    face = meshes[name] if name else max(meshes.values(), key=lambda obj: len(obj.data.polygons))
+    said = find_face_regions(face)
+    return read_surface(face), said
