@@ -89,7 +89,7 @@ def test_unwritable_output(tmp_path):
         (lambda t: t.replace("melanin = 0.020", "melanin = 2"), ["melanin", "outside"]),
         (lambda t: t.replace("anger = 1.0", "anger = 1.5"), ["expression.0.emotions.anger", "1"]),
         (lambda t: t.replace("anger = 1.0", "angre = 1.0"), ["angre", "did you mean 'anger'"]),
-        (lambda t: t.replace("mottle = 0.6", "motle = 0.6"), ["motle", "did you mean 'mottle'"]),
+        (lambda t: t.replace("vessels = 0.6", "vesels = 0.6"), ["vesels", "did you mean 'vessels'"]),
         (lambda t: t.replace('id = "sad"', 'id = "fear"'), ["two have the id 'fear'"]),
         (lambda t: t.replace('id = "sad"', 'id = "contact_sheet"'), ["two pictures", "contact_sheet"]),
         (lambda t: t.replace('id = "sad"', 'id = "../sad"'), ["expression.3.id", "file"]),
