@@ -13,7 +13,7 @@ import sanguine_core
 
 from ..domain.effects.effect import Interval
 from ..domain.errors import InputError
-from ..domain.udim import FIRST_TILE
+from ..domain.udim import FIRST_TILE, tile_path
 from .osl import find_oslquery
 
 RANGE = "sanguine_range"
@@ -120,11 +120,16 @@ def _with_alpha(pixels: np.ndarray) -> np.ndarray:
 
 def _tiles(image: bpy.types.Image) -> dict[int, np.ndarray]:
     """By way of files, which are gone afterwards: Blender shows the pixels of the first tile alone."""
+    if "save_copy" not in image.bl_rna.functions["save"].parameters:  # Blender 4.2
+        if image.is_dirty or image.packed_files:
+            raise InputError(f"{image.name}: packed or unsaved tiles: save them as files first, this Blender writes no copies")
+        pattern = bpy.path.abspath(image.filepath_raw)
+        return {tile.number: sanguine_core.read_image(tile_path(pattern, tile.number)) for tile in image.tiles}
     before = image.file_format
     with tempfile.TemporaryDirectory() as folder:
+        suffix = ".exr" if image.is_float else ".png"
         try:
             image.file_format = "OPEN_EXR" if image.is_float else "PNG"  # what loses nothing
-            suffix = ".exr" if image.is_float else ".png"
             image.save(filepath=str(Path(folder) / f"tile.{_TILE}{suffix}"), save_copy=True)
         except RuntimeError as error:
             raise InputError(f"{image.name}: {' '.join(str(error).split())}") from None
@@ -140,10 +145,9 @@ def _decode(image: bpy.types.Image, rgba: np.ndarray) -> None:
     find_oslquery()  # OpenColorIO lies beside it
     try:
         import PyOpenColorIO as ocio
-    except ImportError:
-        raise InputError(
-            f"{image.name}: this Blender has no OpenColorIO for Python: convert the picture to float (32 bit) first"
-        ) from None
+    except ImportError:  # Blender 4.2
+        rgba[..., :3] = _decoded_by_saving(image, rgba)
+        return
     name = image.colorspace_settings.name
     data = getattr(bpy.data, "colorspace", None)  # since Blender 5.0 a file chooses its working space
     try:
@@ -157,3 +161,23 @@ def _decode(image: bpy.types.Image, rgba: np.ndarray) -> None:
         config.getProcessor(name, target).getDefaultCPUProcessor().applyRGBA(rgba)
     except ocio.Exception as error:
         raise InputError(f"{image.name}: colour space '{name}': {' '.join(str(error).split())}") from None
+
+
+def _decoded_by_saving(image: bpy.types.Image, rgba: np.ndarray) -> np.ndarray:
+    """(H, W, 3) in the working space: Blender converts a picture of bytes itself when it writes it as linear EXR."""
+    height, width = rgba.shape[:2]
+    copy = bpy.data.images.new("sanguine decode", width, height, alpha=True)
+    scene = bpy.data.scenes.new("sanguine decode")
+    try:
+        copy.colorspace_settings.name = image.colorspace_settings.name
+        copy.alpha_mode = "CHANNEL_PACKED"  # colours under alpha 0 are colours too
+        copy.pixels.foreach_set(rgba.ravel())
+        settings = scene.render.image_settings
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "linear.exr"
+            copy.save_render(str(path), scene=scene)
+            return sanguine_core.read_image(path)[..., :3]
+    finally:
+        bpy.data.images.remove(copy)
+        bpy.data.scenes.remove(scene)
