@@ -8,6 +8,7 @@ import numpy as np
 import sanguine_core
 
 from ..domain.head import Head, MeshPart, build_head, load_presets, load_regions
+from ..domain.head.surface import triangles
 from ..domain.resources import rigs_path
 from ..domain.strain import ShapeKeys
 from .maps import Surface
@@ -22,12 +23,11 @@ def example_head(head_id: str) -> Head:
 def head_surface(head: Head) -> Surface:
     """The skin of a head, its quads as triangles."""
     skin = head.part("skin")
-    corner = np.arange(skin.faces.size, dtype=np.int32).reshape(-1, 4)
-    triangles = np.concatenate([corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]])
+    corners = np.arange(skin.faces.size, dtype=np.int32).reshape(-1, 4)
     return Surface(
         position_mm=skin.vertices * np.float32(1000.0),
         uv=np.ascontiguousarray(skin.uv.reshape(-1, 2), dtype=np.float32),
-        triangles=np.ascontiguousarray(triangles, dtype=np.int32),
+        triangles=triangles(corners),
         corner_vertex=np.ascontiguousarray(skin.faces.ravel(), dtype=np.int32),
         regions=head.regions,
         keys=_keys(skin),

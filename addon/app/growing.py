@@ -21,7 +21,7 @@ from ..domain.plan import Plan, check_strengths, make_plan
 from ..domain.resources import rigs_path
 from ..domain.shot import read_shot, scene_of
 from ..domain.texel_density import MapSizes
-from ..domain.udim import FIRST_TILE
+from ..domain.udim import FIRST_TILE, tile_path
 from ..domain.uv_checks import uv_warnings
 from .faces import example_head, head_surface
 from .map_cache import MapCache
@@ -74,7 +74,8 @@ def grow_maps(
 ) -> dict[str, Any]:
     """Grows the maps of a head of ours, of a mesh file or of the subjects of a shot, and writes them into `out_dir`.
 
-    read_mesh: of a file, the surface and a remark on its regions. Several subjects get a folder each. Returns the report; raises InputError, one line that names what is wrong.
+    read_mesh: of a file, the surface and a remark on its regions. Several subjects get a folder each. Returns the
+    report; raises InputError, one line that names what is wrong.
     """
     if not SIZES[0] <= request.size <= SIZES[1]:
         raise InputError(f"--size: {request.size} is outside {SIZES[0]} to {SIZES[1]}")
@@ -87,7 +88,7 @@ def grow_maps(
     skin, strengths = (someone.skin, someone.strengths) if request.tone else (default_skin(), {})
     if request.skin_path:
         skin = read_skins(request.skin_path)[1][0]
-    strengths = check_strengths({**strengths, **_expand(request.features)}, "--features")
+    strengths = check_strengths(_expand(request.features), "--features", strengths)
     plan = maps_plan(skin, strengths, surface, someone.growth)
     report = write_chromophores(
         plan, surface, out_dir, request.size, cache, progress, request.spectral_nm, request.tx
@@ -103,8 +104,8 @@ def _grow_shot(
     for subject in shot.subjects:
         surface = head_surface(example_head(subject.rig.head))
         scene = scene_of(shot, subject, tuple(surface.regions))
-        strengths = dict(scene.strengths) | _expand(request.features)
-        plan = maps_plan(scene.skin, check_strengths(strengths, "--features"), surface, scene.growth)
+        strengths = check_strengths(_expand(request.features), "--features", scene.strengths)
+        plan = maps_plan(scene.skin, strengths, surface, scene.growth)
         folder = Path(out_dir) / subject.id if len(shot.subjects) > 1 else out_dir
         reports[subject.id] = write_chromophores(
             plan, surface, folder, request.size, cache, progress, request.spectral_nm, request.tx
@@ -184,9 +185,7 @@ def write_chromophores(
     several = list(tiles) != [FIRST_TILE]
     path = Path(out_dir) / ("chromophores.<UDIM>.exr" if several else "chromophores.exr")
     strengths = {e.id: plan.scene.strengths[e.id] for e in plan.active if e.id in plan.scene.strengths}
-    header = MapHeader(
-        mesh=surface.digest, seed=plan.scene.growth.seed, features=strengths
-    )
+    header = MapHeader(mesh=surface.digest, seed=plan.scene.growth.seed, features=strengths)
     files = write_maps(path, tiles, channels, header)
     if spectral_nm is not None:
         files += write_spectral_set(path, tiles, channels, plan.scene.skin, spectral_nm)
@@ -223,7 +222,7 @@ def write_spectral_set(
     written = []
     for tile, image in tiles.items():
         maps = {name: image[..., i] for i, name in enumerate(channels) if name in PARAMETERS}
-        file = Path(str(path.with_name(path.name.replace("chromophores", "reflectance"))).replace("<UDIM>", str(tile)))
+        file = tile_path(path.with_name(path.name.replace("chromophores", "reflectance")), tile)
         write_spectral(file, maps, skin, wavelengths_nm)
         written.append(file)
     return written

@@ -107,6 +107,7 @@ class Grown:
     def __init__(self, surface: Surface, growth: Growth, size: int, cache: MapCache, progress: Progress | None = None):
         self.surface, self.growth, self.size, self.cache, self.progress = surface, growth, size, cache, progress
         self.key = key_of(surface.digest, asdict(growth), size, _PADDING)
+        self._layers: dict[str, np.ndarray] = {}  # a feature may write to several maps
 
     @cached_property
     def _texels(self) -> sanguine_core.TexelMap:
@@ -127,7 +128,9 @@ class Grown:
                 progress=progress,
             ).astype(np.float16)
 
-        return self.cache.get(key_of(self.key, feature), paint)
+        if feature not in self._layers:
+            self._layers[feature] = self.cache.get(key_of(self.key, feature), paint)
+        return self._layers[feature]
 
     def _part(self, done: int, total: int) -> Progress | None:
         """The progress of one feature as part of all, in thousandths; asked before each, however quick it is."""

@@ -140,3 +140,10 @@ def test_progress_is_told_and_can_stop_it(face):
     assert said == sorted(said) and said[0] == (0, 2000) and said[-1][0] <= 2000
     with pytest.raises(sanguine_core.Cancelled):
         bake_maps(plan_of(face, freckles=1.0), face, SIZES, MapCache(None), lambda done, total: False)
+
+
+def test_a_feature_that_writes_two_maps_is_painted_once(face):
+    (one, _), maps = work(plan_of(face, freckles=1.0), face, MapCache(None))
+    (two, _), more = work(plan_of(face, moles=1.0), face, MapCache(None))
+    assert set(maps) == {"grown"} and set(more) == {"grown", "grown_height"}
+    assert two == one
