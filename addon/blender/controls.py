@@ -1,4 +1,4 @@
-"""Emotion, action-unit and blood sliders on a control bone, and the drivers that listen to them.
+"""Emotion, action-unit and blood sliders on a control bone, and the drivers of the shape keys that listen to them.
 
 Nothing here runs after it is built: a file with these controls works without the add-on, with auto-run off,
 and as a library override. That is why every driver is a simple expression and no handler exists.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX, BloodChannel
+from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX
 from ..domain.errors import InputError, nearest
 from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS, EMOTIONS, SHAPE_KEYS
 from ..domain.response import Response
@@ -67,7 +67,7 @@ def add_controls(armature: bpy.types.Object) -> bpy.types.PoseBone:
     for name, control in CONTROLS.items():
         if name not in bone:
             bone[name] = control.default
-        _describe(bone, name, control.help, 0.0, control.maximum, control.default)
+        describe(bone, name, control.help, 0.0, control.maximum, control.default)
         bone.property_overridable_library_set(f'["{name}"]', True)
     # A driver that is evaluated before the armature's evaluated copy has this pose is marked invalid for good.
     armature.update_tag()
@@ -112,7 +112,7 @@ def drive_shape_keys(armature: bpy.types.Object, meshes: Iterable[bpy.types.Obje
             if existing and not _listens_to(existing, armature):
                 occupied.append(f"{mesh.name}: {name}")
                 continue
-            _drive(keys, path, response, armature)
+            drive(keys, path, response, armature)
             driven.add(name)
     return DriveReport(
         driven=tuple(name for name in SHAPE_KEYS if name in driven),
@@ -121,37 +121,15 @@ def drive_shape_keys(armature: bpy.types.Object, meshes: Iterable[bpy.types.Obje
     )
 
 
-def drive_blood(
-    armature: bpy.types.Object, skin: bpy.types.Object, channels: Iterable[BloodChannel]
-) -> tuple[str, ...]:
-    """Puts one driven custom property per channel on `skin`, for the material to read. Returns their names."""
-    names = []
-    for channel in channels:
-        name, response = channel.property_name, channel.response
-        limits = BLOOD_CONTROL_MAX * response.low, BLOOD_CONTROL_MAX * response.high
-        skin[name] = 0.0
-        what = "blood volume fraction" if channel.quantity == "hemoglobin" else "oxygenation"
-        _describe(skin, name, f"Change of {what} in the {channel.region}, driven by the emotions", *limits, 0.0)
-        _drive(skin, f'["{name}"]', response, armature)
-        names.append(name)
-    return tuple(names)
-
-
 def remove_shape_key_drivers(armature: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> None:
     """Removes the drivers of `drive_shape_keys` and sets the keys back to rest."""
     for mesh in meshes:
         keys = getattr(mesh.data, "shape_keys", None)
-        for path in _remove_drivers(keys, armature) if keys else ():
+        for path in remove_drivers(keys, armature) if keys else ():
             keys.path_resolve(path.removesuffix(".value")).value = 0.0
 
 
-def remove_blood(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
-    """Removes the drivers of `drive_blood` and the properties they drove."""
-    for path in _remove_drivers(skin, armature):
-        del skin[path.removeprefix('["').removesuffix('"]')]
-
-
-def _describe(owner, name: str, help: str, low: float, high: float, default: float) -> None:
+def describe(owner, name: str, help: str, low: float, high: float, default: float) -> None:
     owner.id_properties_ui(name).update(
         description=help, min=low, max=high, soft_min=low, soft_max=high, default=default, step=1.0, precision=3
     )
@@ -176,7 +154,7 @@ def _edit_bones(armature: bpy.types.Object) -> Iterator[bpy.types.ArmatureEditBo
         objects.active = active
 
 
-def _drive(owner: bpy.types.ID, path: str, response: Response, armature: bpy.types.Object) -> None:
+def drive(owner: bpy.types.ID, path: str, response: Response, armature: bpy.types.Object) -> None:
     expression = response.expression()
     if len(expression) >= _MAX_EXPRESSION:
         raise ValueError(f"{path}: driver of {len(expression)} characters, Blender keeps {_MAX_EXPRESSION - 1}: split it")
@@ -208,7 +186,7 @@ def _listens_to(curve: bpy.types.FCurve, armature: bpy.types.Object) -> bool:
     )
 
 
-def _remove_drivers(owner: bpy.types.ID, armature: bpy.types.Object) -> list[str]:
+def remove_drivers(owner: bpy.types.ID, armature: bpy.types.Object) -> list[str]:
     """Removes the drivers of `owner` that listen to the controls; returns their paths."""
     curves = owner.animation_data.drivers if owner.animation_data else ()
     paths = [curve.data_path for curve in curves if _listens_to(curve, armature)]

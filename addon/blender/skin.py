@@ -13,7 +13,7 @@ from ..domain.errors import InputError
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
-from .controls import drive_blood
+from .blood import drive_blood
 from .material import MARK, Map, build_skin_material, remove_skin_material
 from .properties import images_of
 from .strain import drive_components, remove_components

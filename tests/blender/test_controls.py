@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sanguine.blender import controls
+from sanguine.blender import blood, controls
 from sanguine.domain.blood import BLOOD_CHANNELS, BLOOD_CONTROL_MAX, blood_change
 from sanguine.domain.errors import InputError
 from sanguine.domain.facs import ARKIT, EMOTION_CONTROLS, SHAPE_KEYS, shape_key_values
@@ -48,7 +48,7 @@ def face():
     armature, skin = add_armature(), add_mesh("skin", ARKIT.keys)
     controls.add_controls(armature)
     controls.drive_shape_keys(armature, [skin])
-    controls.drive_blood(armature, skin, BLOOD_CHANNELS.values())
+    blood.drive_blood(armature, skin, BLOOD_CHANNELS.values())
     return armature, skin
 
 
@@ -64,13 +64,13 @@ def evaluated(skin):
 def test_drivers_equal_the_domain_for_any_mix(face, values):
     armature, skin = face
     controls.set_controls(armature, values)
-    keys, blood = evaluated(skin)
+    keys, changes = evaluated(skin)
     expected = shape_key_values(values)
     assert {name: keys[name] for name in expected} == pytest.approx(expected, abs=1e-6)
     emotions = {name: values[name] for name in EMOTION_CONTROLS}
     for (region, quantity), channel in BLOOD_CHANNELS.items():
         change = blood_change(emotions, region, values["blood"])[quantity == "oxygenation"]
-        assert blood[channel.property_name] == pytest.approx(change, abs=1e-6)
+        assert changes[channel.property_name] == pytest.approx(change, abs=1e-6)
 
 
 def test_every_driver_is_a_short_simple_expression(face):
@@ -86,7 +86,7 @@ def test_a_driver_that_blender_would_cut_names_its_key(face):
     armature, skin = face
     too_long = Response(tuple((0.123456789, control) for control in list(controls.CONTROLS)[:20]))
     with pytest.raises(ValueError, match="jawOpen.*split it"):
-        controls._drive(skin.data.shape_keys, 'key_blocks["jawOpen"].value', too_long, armature)
+        controls.drive(skin.data.shape_keys, 'key_blocks["jawOpen"].value', too_long, armature)
 
 
 def test_controls_have_range_tooltip_and_default_and_can_be_overridden(face):
@@ -125,7 +125,7 @@ def test_removal_leaves_no_trace(face):
     controls.set_controls(armature, {"anger": 1.0})
     evaluated(skin)
     controls.remove_shape_key_drivers(armature, [skin, armature])
-    controls.remove_blood(armature, skin)
+    blood.remove_blood(armature, skin)
     controls.remove_controls(armature)
     assert skin.animation_data is None and skin.data.shape_keys.animation_data is None
     assert not skin.keys() and not armature.keys() and not armature.data.bones
@@ -210,7 +210,7 @@ def test_drivers_work_on_a_face_that_was_seen_before_its_armature():
     armature = add_armature()
     controls.add_controls(armature)
     controls.drive_shape_keys(armature, [skin])
-    controls.drive_blood(armature, skin, [BLOOD_CHANNELS["cheeks", "hemoglobin"]])
+    blood.drive_blood(armature, skin, [BLOOD_CHANNELS["cheeks", "hemoglobin"]])
     bpy.context.view_layer.update()
     controls.set_controls(armature, {"anger": 1.0})
     bpy.context.view_layer.update()
