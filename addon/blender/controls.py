@@ -12,15 +12,27 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX
+from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX, STATES
 from ..domain.errors import InputError, nearest
-from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS, EMOTIONS, SHAPE_KEYS
-from ..domain.response import Response
+from ..domain.facs import (
+    ACTION_UNITS,
+    DEFAULT_EMOTIONS,
+    EMOTION_CONTROLS,
+    EMOTION_MAX,
+    EMOTIONS,
+    SHAPE_KEYS,
+    UNIT_CONTROLS,
+    VARIANTS,
+    Formulas,
+    formulas,
+)
+from ..domain.response import MAX_EXPRESSION, Formula, driver_text
 
 CONTROL_BONE = "sanguine"
 
-# Blender stores a driver's expression in 256 bytes and cuts what is longer without a word.
-_MAX_EXPRESSION = 255
+# Intermediate values of `Formulas.properties` are custom properties of the armature object itself.
+_INTERMEDIATE = ("unit_", "sum_")
+_INTERMEDIATE_PATHS = tuple(f'["{prefix}' for prefix in _INTERMEDIATE)
 
 
 @dataclass(frozen=True)
@@ -30,32 +42,55 @@ class Control:
     help: str
     default: float = 0.0
     maximum: float = 1.0
+    soft_maximum: float = 1.0
 
+
+_VARIANTS_HELP = ", ".join(f"{value:g} {name}" for name, value in VARIANTS.items())
 
 CONTROLS: dict[str, Control] = {
-    **{name: Control(EMOTIONS[name].help) for name in EMOTION_CONTROLS},
+    **{name: Control(f"{EMOTIONS[name].help}. {_VARIANTS_HELP}", maximum=EMOTION_MAX) for name in EMOTION_CONTROLS},
+    **{name: Control(help) for name, help in STATES.items()},
     BLOOD_CONTROL: Control(
-        "How strongly emotion moves blood: 0 not at all, 1 as in life, above 1 exaggerated", 1.0, BLOOD_CONTROL_MAX
+        "How strongly blood answers: 0 not at all, 1 as in life, above 1 exaggerated",
+        1.0,
+        BLOOD_CONTROL_MAX,
+        BLOOD_CONTROL_MAX,
     ),
-    **{unit.control: Control(unit.help) for unit in ACTION_UNITS.values()},
+    **{name: Control(help) for name, help in UNIT_CONTROLS.items()},
 }
-"""Every slider, in the order in which they are added."""
+"""Every slider that a rig can have, in the order in which they are added."""
 
 
 @dataclass(frozen=True)
 class DriveReport:
     """What became of the shape keys that the controls know.
 
-    `occupied` lists "mesh: key" for keys left alone because something else drives them already.
+    `occupied` lists "mesh: key" for keys left alone because something else drives them already. `still` lists the
+    action units that move none of the keys driven.
     """
 
     driven: tuple[str, ...]
     missing: tuple[str, ...]
     occupied: tuple[str, ...]
+    still: tuple[str, ...]
 
 
-def add_controls(armature: bpy.types.Object) -> bpy.types.PoseBone:
-    """Puts all sliders on the control bone, which is made if the armature has none. Values already set are kept."""
+def add_controls(
+    armature: bpy.types.Object,
+    emotions: Iterable[str] = DEFAULT_EMOTIONS,
+    states: Iterable[str] = (),
+    sides: bool = True,
+) -> bpy.types.PoseBone:
+    """Puts sliders on the control bone, which is made if the armature has none: for these emotions and states, for
+    blood, for every action unit and (`sides`) for its halves.
+
+    Done again, it adds what is new; values, animation and sliders that are there stay. Raises InputError for an
+    emotion or a state that does not exist.
+    """
+    asked = {name for name in emotions if name != "neutral"} | set(states)
+    for name in asked:
+        if name not in EMOTION_CONTROLS and name not in STATES:
+            raise InputError(f"{name}: no such emotion or state, {nearest(name, (*EMOTION_CONTROLS, *STATES))}")
     if CONTROL_BONE not in armature.data.bones:
         with _edit_bones(armature) as bones:
             bone = bones.new(CONTROL_BONE)
@@ -64,15 +99,44 @@ def add_controls(armature: bpy.types.Object) -> bpy.types.PoseBone:
     if armature.pose is None:  # an armature made by a script has no pose until it is first evaluated
         bpy.context.view_layer.update()
     bone = armature.pose.bones[CONTROL_BONE]
+    halves = {f"AU{side}" for unit in ACTION_UNITS.values() if unit.sided and not unit.one_sided for side in unit.sides}
     for name, control in CONTROLS.items():
         if name not in bone:
+            if (name in EMOTION_CONTROLS or name in STATES) and name not in asked or name in halves and not sides:
+                continue
             bone[name] = control.default
-        describe(bone, name, control.help, 0.0, control.maximum, control.default)
+        describe(bone, name, control.help, 0.0, control.maximum, control.default, control.soft_maximum)
         bone.property_overridable_library_set(f'["{name}"]', True)
     # A driver that is evaluated before the armature's evaluated copy has this pose is marked invalid for good.
     armature.update_tag()
     bpy.context.view_layer.update()
+    _drive_units(armature)
     return bone
+
+
+def remove_emotion(armature: bpy.types.Object, name: str) -> None:
+    """Takes one emotion or state off the rig. What else listens to it (blood) has to be driven anew; its animation
+    stays in its action and plays again when the emotion is put back."""
+    bone = armature.pose.bones[CONTROL_BONE]
+    if name not in (*emotions_of(armature), *states_of(armature)):
+        raise InputError(f"{name}: not on this rig, {nearest(name, (*emotions_of(armature), *states_of(armature)))}")
+    del bone[name]
+    _drive_units(armature)
+
+
+def emotions_of(armature: bpy.types.Object) -> tuple[str, ...]:
+    """The emotions that are on a rig."""
+    return _on(armature, EMOTION_CONTROLS)
+
+
+def states_of(armature: bpy.types.Object) -> tuple[str, ...]:
+    """The states of the body that are on a rig."""
+    return _on(armature, STATES)
+
+
+def _on(armature: bpy.types.Object, names: Iterable[str]) -> tuple[str, ...]:
+    bone = armature.pose.bones.get(CONTROL_BONE) if armature.pose else None
+    return tuple(name for name in names if name in bone) if bone else ()
 
 
 def remove_controls(armature: bpy.types.Object) -> None:
@@ -83,13 +147,20 @@ def remove_controls(armature: bpy.types.Object) -> None:
 
 
 def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> None:
-    """Sets sliders by name. Raises InputError for an unknown name or a value outside the slider."""
+    """Sets sliders by name. Raises InputError for an unknown name or a value outside the slider.
+
+    A slider that the rig has not is at 0: that may be asked for, anything else may not.
+    """
     bone = armature.pose.bones[CONTROL_BONE]
     for name, value in values.items():
         if name in EMOTIONS and name not in CONTROLS:
             continue  # neutral is a face to ask for, not a slider
         if name not in CONTROLS:
             raise InputError(f"{name}: no such control, {nearest(name, CONTROLS)}")
+        if name not in bone:
+            if value == 0.0:
+                continue
+            raise InputError(f"{name}: not on this rig, which has {', '.join(emotions_of(armature) + states_of(armature))}")
         if not 0.0 <= value <= CONTROLS[name].maximum:
             raise InputError(f"{name}: {value} is outside 0 to {CONTROLS[name].maximum:g}")
         bone[name] = float(value)
@@ -101,23 +172,29 @@ def drive_shape_keys(armature: bpy.types.Object, meshes: Iterable[bpy.types.Obje
 
     A key that someone else drives is left alone. Raises ValueError when a driver cannot be made, naming the key.
     """
-    driven, occupied = set(), []
+    responses = _formulas(armature).keys
+    wanted, occupied = [], []
     for mesh in meshes:
         keys = getattr(mesh.data, "shape_keys", None)
-        for name, response in SHAPE_KEYS.items():
+        for name in responses:
             if keys is None or name not in keys.key_blocks:
                 continue
             path = f'key_blocks["{name}"].value'
             existing = _driver(keys, path)
             if existing and not _listens_to(existing, armature):
                 occupied.append(f"{mesh.name}: {name}")
-                continue
-            drive(keys, path, response, armature)
-            driven.add(name)
+            else:
+                wanted.append((keys, path, name))
+    driven = {name for _, _, name in wanted}
+    units = {unit for name in driven for unit in responses[name].controls()}
+    _drive_units(armature, units)
+    for keys, path, name in wanted:
+        drive(keys, path, responses[name], armature)
     return DriveReport(
         driven=tuple(name for name in SHAPE_KEYS if name in driven),
         missing=tuple(name for name in SHAPE_KEYS if name not in driven),
         occupied=tuple(occupied),
+        still=tuple(unit.id for unit in ACTION_UNITS.values() if not driven & set(unit.keys)),
     )
 
 
@@ -127,11 +204,67 @@ def remove_shape_key_drivers(armature: bpy.types.Object, meshes: Iterable[bpy.ty
         keys = getattr(mesh.data, "shape_keys", None)
         for path in remove_drivers(keys, armature) if keys else ():
             keys.path_resolve(path.removesuffix(".value")).value = 0.0
+    _drive_units(armature)
 
 
-def describe(owner, name: str, help: str, low: float, high: float, default: float) -> None:
+def _formulas(armature: bpy.types.Object) -> Formulas:
+    bone = armature.pose.bones[CONTROL_BONE]
+    return formulas(emotions_of(armature), sided=any(f"AU{unit.id}L" in bone for unit in ACTION_UNITS.values() if not unit.one_sided))
+
+
+def _drive_units(armature: bpy.types.Object, more: Iterable[str] = ()) -> None:
+    """Makes the intermediate properties that drivers listen to, and `more`, as the rig's emotions want them; removes
+    those that nobody needs."""
+    owners = [armature, *bpy.data.shape_keys]
+    heard = {
+        target.data_path[2:-2]
+        for owner in owners
+        for curve in (owner.animation_data.drivers if owner.animation_data else ())
+        if not (owner == armature and curve.data_path.startswith(_INTERMEDIATE_PATHS))
+        for variable in curve.driver.variables
+        for target in variable.targets
+        if target.id == armature and target.data_path.startswith('["')
+    }
+    bone = armature.pose.bones.get(CONTROL_BONE)
+    needed = _formulas(armature).needed({*heard, *more}) if bone else {}
+    for name in [key for key in armature.keys() if key.startswith(_INTERMEDIATE) and key not in needed]:
+        armature.driver_remove(f'["{name}"]')
+        del armature[name]
+    for name in needed:
+        if name not in armature:
+            armature[name] = 0.0
+            describe(armature, name, f"Between the sliders and the face: {name.replace('_', ' of unit ')}, driven", 0.0, 1.0, 0.0)
+    # As with the sliders: what a driver reads must be in the evaluated copy before.
+    armature.update_tag()
+    bpy.context.view_layer.update()
+    for name, formula in needed.items():
+        path = f'["{name}"]'
+        existing = _driver(armature, path)
+        if existing is None or existing.driver.expression != driver_text(formula)[0] or not _hears(existing, formula):
+            drive(armature, path, formula, armature)
+    animation = armature.animation_data
+    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
+        armature.animation_data_clear()
+
+
+def _hears(curve: bpy.types.FCurve, formula: Formula) -> bool:
+    """Whether the variables of a driver are those of the formula: short texts say a, b, c for any control."""
+    wanted = {variable: _target_path(name) for variable, name in driver_text(formula)[1].items()}
+    return {v.name: v.targets[0].data_path for v in curve.driver.variables} == wanted
+
+
+def describe(
+    owner, name: str, help: str, low: float, high: float, default: float, soft_high: float | None = None
+) -> None:
     owner.id_properties_ui(name).update(
-        description=help, min=low, max=high, soft_min=low, soft_max=high, default=default, step=1.0, precision=3
+        description=help,
+        min=low,
+        max=high,
+        soft_min=low,
+        soft_max=high if soft_high is None else soft_high,
+        default=default,
+        step=1.0,
+        precision=3,
     )
 
 
@@ -154,24 +287,30 @@ def _edit_bones(armature: bpy.types.Object) -> Iterator[bpy.types.ArmatureEditBo
         objects.active = active
 
 
-def drive(owner: bpy.types.ID, path: str, response: Response, armature: bpy.types.Object) -> None:
-    expression = response.expression()
-    if len(expression) >= _MAX_EXPRESSION:
-        raise ValueError(f"{path}: driver of {len(expression)} characters, Blender keeps {_MAX_EXPRESSION - 1}: split it")
+def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.Object) -> None:
+    """Drives `path` of `owner` by a formula of controls. Raises ValueError, naming the path, where Blender cannot."""
+    expression, variables = driver_text(formula)
+    if len(expression) >= MAX_EXPRESSION:
+        raise ValueError(f"{path}: driver of {len(expression)} characters, Blender keeps {MAX_EXPRESSION - 1}: split it")
     owner.driver_remove(path)
     curve = owner.driver_add(path)
     curve.keyframe_points.clear()  # the default curve is an identity that rounds; without keys the value passes as it is
     driver = curve.driver
     driver.type = "SCRIPTED"
-    for name in response.controls():
+    for name, control in variables.items():
         variable = driver.variables.new()
         variable.name = name
         variable.targets[0].id = armature
-        variable.targets[0].data_path = f'pose.bones["{CONTROL_BONE}"]["{name}"]'
+        variable.targets[0].data_path = _target_path(control)
     driver.expression = expression
     if not (driver.is_valid and driver.is_simple_expression):
         owner.driver_remove(path)
         raise ValueError(f"{path}: Blender does not take this as a simple expression: {expression}")
+
+
+def _target_path(name: str) -> str:
+    """Where the armature object keeps a control or an intermediate value."""
+    return f'["{name}"]' if name.startswith(_INTERMEDIATE) else f'pose.bones["{CONTROL_BONE}"]["{name}"]'
 
 
 def _driver(owner: bpy.types.ID, path: str) -> bpy.types.FCurve | None:
@@ -180,7 +319,7 @@ def _driver(owner: bpy.types.ID, path: str) -> bpy.types.FCurve | None:
 
 def _listens_to(curve: bpy.types.FCurve, armature: bpy.types.Object) -> bool:
     return any(
-        target.id == armature and target.data_path.startswith(f'pose.bones["{CONTROL_BONE}"]')
+        target.id == armature and target.data_path.startswith((f'pose.bones["{CONTROL_BONE}"]', *_INTERMEDIATE_PATHS))
         for variable in curve.driver.variables
         for target in variable.targets
     )

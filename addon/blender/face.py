@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
 
 from ..app.faces import example_head
+from ..domain.facs import DEFAULT_EMOTIONS
 from ..domain.head import load_presets
 from ..domain.resources import rigs_path
 from .controls import add_controls, drive_shape_keys
@@ -28,12 +30,15 @@ class Face:
         return {name: self.landmarks[name] for name in ("eyes", "chin", "crown")}
 
 
-def add_face(head_id: str) -> Face:
-    """Builds a head of `rigs/heads.toml` in the open scene. Raises HeadError when its package is not installed."""
+def add_face(head_id: str, emotions: Iterable[str] = DEFAULT_EMOTIONS, states: Iterable[str] = ()) -> Face:
+    """Builds a head of `rigs/heads.toml` in the open scene, with sliders for these emotions and states of the body.
+
+    Raises HeadError when its package is not installed.
+    """
     head = example_head(head_id)
     objects = build_face(head, load_presets(rigs_path("heads.toml"))[head_id], bpy.data.materials.new("skin"))
     store_regions(objects.skin, head.regions)
-    add_controls(objects.rig)
+    add_controls(objects.rig, emotions, states)
     drive_shape_keys(objects.rig, objects.parts.values())
     landmarks = {name: tuple(float(x) for x in place) for name, place in head.landmarks.items()}
     return Face(objects.skin, objects.rig, landmarks)

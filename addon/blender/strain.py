@@ -14,7 +14,8 @@ import numpy as np
 
 from ..domain.effects import strain, wrinkles
 from ..domain.effects.strain import HALVES
-from ..domain.key_sums import MAX_EXPRESSION, KeySum, key_sums
+from ..domain.key_sums import KeySum, key_sums
+from ..domain.response import MAX_EXPRESSION
 
 # Coefficients below this share of a component are left out: together they move no map by as much as its rounding.
 LEAST = 0.004

@@ -21,6 +21,9 @@ BLOOD_CONTROL = "blood"
 BLOOD_CONTROL_MAX = 2.0
 """The artist's slider over all blood change: 0 none, 1 as declared, 2 twice."""
 
+STATES: dict[str, str] = {}
+"""States of the body (exertion, cold, ...) -> help: sliders 0-1 that move blood and no muscle."""
+
 
 class Evidence(Row):
     """One row of rigs/evidence.csv: what was seen, in whom, by whom."""

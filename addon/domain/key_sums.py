@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .response import number_text
-
-# Blender stores a driver's expression in 256 bytes and cuts what is longer without a word.
-MAX_EXPRESSION = 255
+from .response import MAX_EXPRESSION, number_text
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from . import people
 from .effects import Frame, Growth, Scene
 from .effects.effect import Interval
 from .errors import InputError, nearest
-from .facs import ACTION_UNITS, EMOTIONS
+from .facs import EMOTIONS, UNIT_CONTROLS
 from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
@@ -120,10 +120,9 @@ class Pose(_Table):
     @pydantic.field_validator("action_units")
     @classmethod
     def _units(cls, value: dict[str, float]) -> dict[str, float]:
-        known = [unit.control for unit in ACTION_UNITS.values()]
         for name in value:
-            if name not in known:
-                raise ValueError(f"no such action unit '{name}', {nearest(name, known)}")
+            if name not in UNIT_CONTROLS:
+                raise ValueError(f"no such action unit '{name}', {nearest(name, UNIT_CONTROLS)}")
         return value
 
 

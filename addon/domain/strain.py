@@ -44,7 +44,7 @@ _SMOOTHING = 2  # rounds over the neighbours: strain is constant on a triangle, 
 _FOLD_SMOOTHING = 4
 _FACTORED_VERTICES = 4000
 # What counts when components are chosen, per row: emotions above action units above single keys.
-_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 3.0, 1.0, 0.3
+_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 2.0, 1.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -224,10 +224,21 @@ def poses(names: Sequence[str], controls: Sequence[Mapping[str, float]]) -> np.n
     return np.array([[row.get(name, 0.0) for name in names] for row in rows]).reshape(len(controls), len(names))
 
 
+def _on_both_sides(names: Sequence[str], rows: np.ndarray) -> np.ndarray:
+    """Poses (P, K) with each key as high as its twin on the other side."""
+    place = {name: i for i, name in enumerate(names)}
+    twins = [
+        place.get(name.replace("Left", "*").replace("Right", "Left").replace("*", "Right"), i)
+        for i, name in enumerate(names)
+    ]
+    return np.maximum(rows, rows[:, twins])
+
+
 def _asked_for(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Poses (P, K) that the components have to serve, and how much each counts (P,)."""
-    emotions = poses(names, [{name: 1.0} for name in EMOTION_CONTROLS])
-    units = poses(names, [{unit.control: 1.0} for unit in ACTION_UNITS.values()])
+    # Patterns are found on the whole face and driven by halves: one-sided poses would split them.
+    emotions = _on_both_sides(names, poses(names, [{name: 1.0} for name in EMOTION_CONTROLS]))
+    units = poses(names, [{control: 1.0} for u in ACTION_UNITS.values() if not u.one_sided for control in u.whole])
     weights = (_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT)
     rows = (emotions, units, np.eye(len(names)))
     return np.concatenate(rows), np.concatenate([np.full(len(r), w) for r, w in zip(rows, weights, strict=True)])

@@ -12,16 +12,27 @@ from hypothesis import strategies as st
 from sanguine.blender import blood, controls
 from sanguine.domain.blood import BLOOD_CHANNELS, BLOOD_CONTROL_MAX, blood_change
 from sanguine.domain.errors import InputError
-from sanguine.domain.facs import ARKIT, EMOTION_CONTROLS, SHAPE_KEYS, shape_key_values
+from sanguine.domain.facs import (
+    ACTION_UNITS,
+    ARKIT,
+    DEFAULT_EMOTIONS,
+    EMOTION_CONTROLS,
+    EMOTION_MAX,
+    EMOTIONS,
+    SHAPE_KEYS,
+    UNIT_CONTROLS,
+    formulas,
+    shape_key_values,
+)
 from sanguine.domain.response import Response
 
+# Few units at once: with all of them at random, what excludes each other leaves nothing to compare.
 mixes = st.fixed_dictionaries(
-    {
-        name: st.floats(0.0, 1.0) if name in EMOTION_CONTROLS else st.sampled_from((0.0, 0.0, 0.0, 0.3, 1.0))
-        for name in controls.CONTROLS
-        if name != "blood"
-    }
-    | {"blood": st.floats(0.0, BLOOD_CONTROL_MAX)}
+    {"blood": st.floats(0.0, BLOOD_CONTROL_MAX)} | {name: st.floats(0.0, EMOTION_MAX) for name in EMOTION_CONTROLS}
+).flatmap(
+    lambda emotions: st.dictionaries(st.sampled_from(list(UNIT_CONTROLS)), st.floats(0.0, 1.0), max_size=8).map(
+        lambda units: emotions | units
+    )
 )
 
 
@@ -43,10 +54,10 @@ def add_armature():
 
 @pytest.fixture
 def face():
-    """An armature and a skin with all 52 keys, driven."""
+    """An armature and a skin with all keys, driven by all emotions."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    armature, skin = add_armature(), add_mesh("skin", ARKIT.keys)
-    controls.add_controls(armature)
+    armature, skin = add_armature(), add_mesh("skin", SHAPE_KEYS)
+    controls.add_controls(armature, EMOTION_CONTROLS)
     controls.drive_shape_keys(armature, [skin])
     blood.drive_blood(armature, skin, BLOOD_CHANNELS.values())
     return armature, skin
@@ -59,11 +70,16 @@ def evaluated(skin):
     return keys, {c.property_name: result[c.property_name] for c in BLOOD_CHANNELS.values()}
 
 
+def evaluated_keys(skin):
+    result = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return {key.name: key.value for key in result.data.shape_keys.key_blocks if key.name in SHAPE_KEYS}
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=mixes)
 def test_drivers_equal_the_domain_for_any_mix(face, values):
     armature, skin = face
-    controls.set_controls(armature, values)
+    controls.set_controls(armature, dict.fromkeys(controls.CONTROLS, 0.0) | values)
     keys, changes = evaluated(skin)
     expected = shape_key_values(values)
     assert {name: keys[name] for name in expected} == pytest.approx(expected, abs=1e-6)
@@ -73,13 +89,75 @@ def test_drivers_equal_the_domain_for_any_mix(face, values):
         assert changes[channel.property_name] == pytest.approx(change, abs=1e-6)
 
 
+def drivers_of(*owners):
+    return [curve for owner in owners if owner.animation_data for curve in owner.animation_data.drivers]
+
+
 def test_every_driver_is_a_short_simple_expression(face):
-    _, skin = face
-    curves = [*skin.animation_data.drivers, *skin.data.shape_keys.animation_data.drivers]
-    assert len(curves) == len(SHAPE_KEYS) + len(BLOOD_CHANNELS)
-    for curve in curves:
+    armature, skin = face
+    assert len(drivers_of(skin, skin.data.shape_keys)) == len(SHAPE_KEYS) + len(BLOOD_CHANNELS)
+    assert {curve.data_path[2:-2] for curve in drivers_of(armature)} == set(formulas().properties)
+    for curve in drivers_of(armature, skin, skin.data.shape_keys):
         assert curve.driver.is_valid and curve.driver.is_simple_expression, curve.data_path
         assert len(curve.driver.expression) < 255
+
+
+def texts(*owners):
+    return {
+        (owner.name, curve.data_path): (
+            curve.driver.expression, [(v.name, v.targets[0].data_path) for v in curve.driver.variables]
+        )
+        for owner in owners
+        for curve in drivers_of(owner)
+    }  # fmt: skip
+
+
+def test_an_emotion_costs_nothing_before_it_is_on_the_rig_and_leaves_nothing_behind():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature, skin = add_armature(), add_mesh("skin", SHAPE_KEYS)
+    keys = skin.data.shape_keys
+    bone = controls.add_controls(armature, ())
+    controls.drive_shape_keys(armature, [skin])
+    assert controls.emotions_of(armature) == () and "anger" not in bone
+    bare = texts(armature, keys)
+    assert len(bare) == len(SHAPE_KEYS) + len(formulas(()).properties)
+    controls.set_controls(armature, {"AU12": 0.5})
+    bone["AU4"] = 0.25
+    bone.keyframe_insert('["AU4"]', frame=3)
+    controls.add_controls(armature, ["fear"])
+    controls.add_controls(armature, ["surprise"])
+    assert controls.emotions_of(armature) == ("fear", "surprise") and bone["AU12"] == 0.5
+    assert bone.id_data.animation_data.action is not None
+    asked = {f"sum_{unit}" for name in ("fear", "surprise") for unit in EMOTIONS[name].units}
+    both = texts(armature, keys)
+    assert {path[2:-2] for _, path in set(both) - set(bare)} == asked
+    controls.set_controls(armature, {"fear": 0.7})
+    assert evaluated_keys(skin) == pytest.approx(shape_key_values({"AU12": 0.5, "AU4": 0.25, "fear": 0.7}), abs=1e-6)
+    for name in ("fear", "surprise"):
+        controls.remove_emotion(armature, name)
+    assert texts(armature, keys) == bare and {key for key in armature.keys() if key.startswith("sum_")} == set()
+    with pytest.raises(InputError, match="fear: not on this rig"):
+        controls.remove_emotion(armature, "fear")
+    with pytest.raises(InputError, match="fear: not on this rig"):
+        controls.set_controls(armature, {"fear": 1.0})
+    controls.set_controls(armature, {"fear": 0.0})
+    with pytest.raises(InputError, match="feer: no such emotion or state, did you mean 'fear'"):
+        controls.add_controls(armature, ["feer"])
+
+
+def test_a_rig_without_sides_has_neither_their_sliders_nor_their_drivers():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature, skin = add_armature(), add_mesh("skin", SHAPE_KEYS)
+    bone = controls.add_controls(armature, sides=False)
+    controls.drive_shape_keys(armature, [skin])
+    assert "AU12" in bone and "AU46L" in bone and "AU12L" not in bone
+    heard = {v.targets[0].data_path for curve in drivers_of(armature) for v in curve.driver.variables}
+    assert all(f'["AU{side}"]' not in path for path in heard for side in ACTION_UNITS["12"].sides)
+    controls.set_controls(armature, {"happy": 1.0})
+    assert evaluated_keys(skin) == pytest.approx(shape_key_values({"happy": 1.0}), abs=1e-6)
+    assert "AU12L" in controls.add_controls(armature)
+    controls.set_controls(armature, {"happy": 0.0, "AU12L": 1.0})
+    assert evaluated_keys(skin) == pytest.approx(shape_key_values({"AU12L": 1.0}), abs=1e-6)
 
 
 def test_a_driver_that_blender_would_cut_names_its_key(face):
@@ -94,7 +172,8 @@ def test_controls_have_range_tooltip_and_default_and_can_be_overridden(face):
     assert set(bone.keys()) >= set(controls.CONTROLS)
     for name, control in controls.CONTROLS.items():
         ui = bone.id_properties_ui(name).as_dict()
-        assert (ui["min"], ui["max"], ui["soft_max"]) == (0.0, control.maximum, control.maximum)
+        assert (ui["min"], ui["max"], ui["soft_max"]) == (0.0, control.maximum, control.soft_maximum)
+        assert control.maximum == (EMOTION_MAX if name in EMOTION_CONTROLS else 2.0 if name == "blood" else 1.0)
         assert ui["default"] == bone[name] == control.default == (1.0 if name == "blood" else 0.0)
         assert len(ui["description"]) > 5
         assert bone.is_property_overridable_library(f'["{name}"]')
@@ -110,12 +189,16 @@ def test_blood_properties_hold_their_whole_range(face):
 def test_missing_and_occupied_keys_are_reported_and_left_alone():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     armature, skin, teeth = add_armature(), add_mesh("skin", ["jawOpen", "browInnerUp"]), add_mesh("teeth", ["jawOpen"])
-    controls.add_controls(armature)
+    bone = controls.add_controls(armature)
+    assert controls.emotions_of(armature) == DEFAULT_EMOTIONS and not set(bone.keys()) & set(controls.STATES)
     skin.data.shape_keys.key_blocks["browInnerUp"].driver_add("value").driver.expression = "0.25"
     report = controls.drive_shape_keys(armature, [skin, teeth, armature])
     assert report.driven == ("jawOpen",)
     assert set(report.missing) == set(SHAPE_KEYS) - {"jawOpen"}
     assert report.occupied == ("skin: browInnerUp",)
+    assert set(report.still) == set(ACTION_UNITS) - {"26", "27"}
+    reads = formulas(DEFAULT_EMOTIONS).needed(formulas().keys["jawOpen"].controls())
+    assert {key for key in armature.keys()} == set(reads), "no more than the keys that are there ask for"
     assert controls.drive_shape_keys(armature, [skin, teeth, armature]) == report
     assert skin.data.shape_keys.animation_data.drivers.find('key_blocks["browInnerUp"].value').driver.expression == "0.25"
 
