@@ -12,7 +12,7 @@ import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin
 
 import pydantic
 
@@ -88,8 +88,10 @@ def _first_fault(error: pydantic.ValidationError, model: type[pydantic.BaseModel
 
 def _keys_at(model: type[pydantic.BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     """Field names allowed at `loc` inside `model`, for the hint at an unknown key."""
+    of_dict = False
     for part in loc:
-        if isinstance(part, int):
+        if isinstance(part, int) or of_dict:  # a row's number, or its name: not a field
+            of_dict = False
             continue
         field = model.model_fields.get(part) or next(
             (f for f in model.model_fields.values() if f.alias == part), None
@@ -97,6 +99,7 @@ def _keys_at(model: type[pydantic.BaseModel], loc: tuple[int | str, ...]) -> lis
         inner = next((m for m in _models_in(field.annotation)), None) if field else None
         if inner is None:
             return []
+        of_dict = get_origin(field.annotation) is dict
         model = inner
     return [field.alias or name for name, field in model.model_fields.items()]
 
