@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from .errors import InputError, nearest
-from .facs import ACTION_UNITS, ARKIT, EMOTION_CONTROLS, EMOTIONS
+from .facs import ACTION_UNITS, ARKIT, EMOTION_CONTROLS, EMOTIONS, UNIT_CONTROLS, side_of
 from .resources import Row, read_table, rigs_path
 
 # A key that is moved by two of ours at half their value each has shares of 0.5; more than 2 would be a unit of another kind.
@@ -78,7 +78,7 @@ class Names(Row):
 
     def rows(self) -> dict[str, KeyRow]:
         """All rows, those of `identity` included."""
-        own = {"": (), "arkit": ARKIT.keys, "units": _unit_controls()}[self.identity]
+        own = {"": (), "arkit": ARKIT.keys, "units": UNIT_CONTROLS}[self.identity]
         return {**{name: KeyRow(of={name: 1.0}) for name in own}, **self.keys}
 
 
@@ -88,13 +88,10 @@ def _short_row(row: Any) -> Any:
     return row if not isinstance(row, dict) or "of" in row else {"of": row}
 
 
-def _unit_controls() -> tuple[str, ...]:
-    return tuple(unit.control for unit in ACTION_UNITS.values())
-
-
 def known_targets() -> frozenset[str]:
-    """What a foreign key may be made of: the ARKit keys, the action units' controls (`AU12`), the emotions."""
-    return frozenset((*ARKIT.keys, *_unit_controls(), *EMOTION_CONTROLS))
+    """What a foreign key may be made of: the ARKit keys, action units (`AU12`, `AU12L`: the names of their sliders),
+    emotions."""
+    return frozenset((*ARKIT.keys, *UNIT_CONTROLS, *EMOTION_CONTROLS))
 
 
 def form(name: str) -> str:
@@ -203,8 +200,8 @@ class Recognised:
 
     @property
     def units(self) -> dict[str, Shares]:
-        """Mesh key -> shares of action units' controls."""
-        return self._made_of(frozenset(_unit_controls()))
+        """Mesh key -> shares of action units, or of one side of them."""
+        return self._made_of(frozenset(UNIT_CONTROLS))
 
     @property
     def emotions(self) -> dict[str, Shares]:
@@ -293,6 +290,9 @@ class Recogniser:
                         continue
                 key, row = candidates[0][1], table[name]
                 claims = _claims(row.of)
+                if name in UNIT_CONTROLS and (halves := [rows[half] for half in (f"{name}L", f"{name}R") if half in rows]):
+                    spare[key] = tuple(half[0][1] for half in halves)
+                    continue
                 if taken := tuple(dict.fromkeys(reached[claim] for claim in claims if claim in reached)):
                     spare[key] = taken
                     continue
@@ -412,10 +412,12 @@ def _claims(shares: Iterable[str]) -> tuple[str, ...]:
     claims: dict[str, None] = {}
     for name in shares:
         if name in EMOTIONS:
-            claims |= dict.fromkeys(_claims(f"AU{unit}" for unit, share in EMOTIONS[name].units.items() if share >= 0.5))
+            full = {unit: shares[1] for unit, shares in EMOTIONS[name].units.items()}
+            claims |= dict.fromkeys(_claims(f"AU{unit}" for unit, share in full.items() if share >= 0.5))
         elif name.startswith("AU"):
-            keys = ACTION_UNITS[name[2:]].keys
-            claims |= dict.fromkeys(key for key, share in keys.items() if share >= 0.5 * max(keys.values()))
+            keys, side = ACTION_UNITS[name[2:].rstrip("LR")].keys, name[-1] if name[-1] in "LR" else ""
+            strong = [key for key, share in keys.items() if share >= 0.5 * max(keys.values())]
+            claims |= dict.fromkeys(key for key in strong if not side or side_of(key) in ("", side))
         else:
             claims[name] = None
     return tuple(claims)
