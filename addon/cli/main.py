@@ -108,6 +108,32 @@ def _parser() -> argparse.ArgumentParser:
     maps.add_argument("--cache", metavar="DIR", help="folder of what was computed before, 'none' for none")
     maps.add_argument("--out", metavar="FILE", help="write the report there instead of to standard output")
 
+    physiology = _verb(verbs, "physiology", _physiology, "what recordings of an oximeter and a skin analyser say about the "
+                       "blood of emotions")
+    physiology.add_argument("recordings", metavar="RECORDING.csv", nargs="+",
+                            help="columns time_s, subject, sex, emotion, spo2_percent, pulse_bpm, … (docs/physiology.md)")
+    physiology.add_argument("--plots", metavar="DIR", help="folder for changes.png and courses.png")
+    physiology.add_argument("--profile", metavar="PROFILE.toml", help="write the supported changes for a rig")
+    physiology.add_argument("--sex", default="pooled", choices=("pooled", "female", "male"),
+                            help="whose changes the profile holds (default %(default)s)")
+    physiology.add_argument("--region", default="", metavar="ID,…",
+                            help="where the skin analyser sat, if the recording has no column 'region'")
+    physiology.add_argument("--oximeter", default="finger", metavar="SITE",
+                            help="finger, or the region of the face it sat on, whose blood its perfusion index then tells")
+    physiology.add_argument("--gain", type=_positive, default=1.0, metavar="X",
+                            help="relative change of blood per relative change of an index (default %(default)s: a guess)")
+    physiology.add_argument("--labels", default="", metavar="OWN=EMOTION,…", help="the recording's own words for emotions")
+    physiology.add_argument("--ignore", default="", metavar="COLUMN,…", help="columns to leave out")
+    physiology.add_argument("--lag-s", default="auto", metavar="auto|X",
+                            help="how late the oximeter answers (default: estimated)")
+    physiology.add_argument("--settle-s", type=_seconds, default=15.0, metavar="X",
+                            help="left out after a label begins (default %(default)s)")
+    physiology.add_argument("--recover-s", type=_seconds, default=60.0, metavar="X",
+                            help="left out of a neutral label that follows an emotion (default %(default)s)")
+    physiology.add_argument("--window-s", type=_positive, default=5.0, metavar="X",
+                            help="samples are averaged in windows of this length (default %(default)s)")
+    physiology.add_argument("--out", metavar="FILE", help="write the report there instead of to standard output")
+
     bench = _verb(verbs, "bench", _bench, "measure what accuracy costs in time; for a checkout of the sources")
     bench.add_argument("what", choices=["accuracy"], help="accuracy: every solver and setting of the optics")
     bench.add_argument("--quick", action="store_true", help="a few cases, seconds instead of minutes")
@@ -251,6 +277,53 @@ def _maps(options: argparse.Namespace) -> int:
     return 0
 
 
+def _physiology(options: argparse.Namespace) -> int:
+    from ..app.physiology import Settings, check_packages, make_profile, read_recordings, report, study, summary
+    from ..app.physiology_plots import write_plots
+    from ..domain.files import check_file, check_folder
+    from ..domain.physiology.cleaning import Settling
+    from ..domain.profile import write_profile
+    from .progress import reporter
+
+    check_packages(options.plots is not None)
+    check_file(options.out)
+    check_file(options.profile)
+    if options.plots is not None:
+        check_folder(options.plots)
+    lag_s = None
+    if options.lag_s != "auto":
+        try:
+            lag_s = float(options.lag_s)
+        except ValueError:
+            raise InputError(f"--lag-s: {options.lag_s!r} is not auto or a number of seconds") from None
+    settings = Settings(
+        labels=_pairs(options.labels, "--labels"), ignore=tuple(filter(None, options.ignore.split(","))), lag_s=lag_s,
+        settling=Settling(options.settle_s, options.recover_s, options.window_s),
+        regions=tuple(filter(None, options.region.split(","))), oximeter=options.oximeter, index_gain=options.gain,
+        profile_of=options.sex,
+    )
+    recordings = read_recordings(options.recordings, settings)
+    with reporter(options.json_progress) as progress:
+        done = study(recordings, settings, progress)
+    profile = make_profile(done) if options.profile is not None else None
+    if options.plots is not None:
+        write_plots(done, options.plots)
+    if profile is not None:
+        write_profile(options.profile, profile)
+    for line in (*done.warnings, *summary(done)):
+        print(f"sanguine: {line}", file=sys.stderr)
+    _answer(report(done), options.out)
+    return 0
+
+
+def _pairs(text: str, flag: str) -> dict[str, str]:
+    pairs = {}
+    for part in filter(None, text.split(",")):
+        name, equals, value = part.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise InputError(f"{flag}: {part!r} is not OWN=EMOTION")
+        pairs[name.strip()] = value.strip()
+    return pairs
 
 
 def _mesh_reader(options: argparse.Namespace) -> Any:
@@ -356,6 +429,13 @@ def _positive(text: str) -> float:
     value = _number(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = _number(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or more seconds")
     return value
 
 

@@ -1,0 +1,106 @@
+"""A profile comes back as it was written, and one that no skin could follow is refused in one line."""
+
+import re
+
+import pytest
+from sanguine.domain.blood import ANATOMY
+from sanguine.domain.errors import InputError
+from sanguine.domain.profile import (
+    Calibration,
+    EmotionRows,
+    Measured,
+    Profile,
+    RecordingRow,
+    at_rest,
+    profile_rows,
+    read_profile,
+    room,
+    write_profile,
+)
+
+ANGER = Measured("anger", "hemoglobin_index", "cheeks", 12, 0.30, 0.20, 0.40)
+
+
+def profile(rows, refused=(), file="a.csv"):
+    return Profile(
+        format=1, sanguine="0.1.0", sex="pooled", subjects=12, unsupported=tuple(refused),
+        calibration=Calibration(index_gain=1.0, index_region=("nose",), oximeter="finger", reference_hemoglobin=0.014, note="n"),
+        recording=(RecordingRow(file=file, sha256="0" * 64, samples=9),),
+        emotion=tuple(EmotionRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
+    )  # fmt: skip
+
+
+def test_a_profile_comes_back(tmp_path):
+    file = 'odd "name" \\ é \x7f.csv'
+    rows, refused = profile_rows([ANGER, Measured("sad", "spo2", "", 9, -0.01, -0.015, -0.005)], 1.0, (), "finger", [file])
+    written = profile(rows, refused, file)
+    write_profile(tmp_path / "p.toml", written)
+    assert read_profile(tmp_path / "p.toml") == written
+    assert written.rows["anger", "cheeks", "hemoglobin"].value == pytest.approx(0.3 * 0.014 * ANATOMY["cheeks"].hemoglobin, rel=1e-3)
+    assert {region for emotion, region, quantity in written.rows if emotion == "sad"} == set(ANATOMY)
+    assert written.rows["sad", "lips", "oxygenation"].low == -0.015
+
+
+def test_an_index_becomes_blood_by_its_gain_where_it_was_taken():
+    nowhere = Measured("fear", "hemoglobin_index", "", 8, -0.1, -0.15, -0.05)
+    rows, refused = profile_rows([nowhere], 2.0, ("cheeks", "lips"), "finger", ["a.csv"])
+    assert not refused and [row.region for row in rows["fear"]] == ["cheeks", "lips"]
+    for row in rows["fear"]:
+        rest = at_rest(row.region, "hemoglobin")
+        assert (row.value, row.low, row.high) == pytest.approx((-0.2 * rest, -0.3 * rest, -0.1 * rest), rel=1e-3)
+    rows, refused = profile_rows([nowhere], 2.0, (), "finger", ["a.csv"])
+    assert not rows and "where" in refused[0].verdict
+
+
+def test_a_finger_says_nothing_of_the_face():
+    finger = Measured("anger", "perfusion", "", 12, -0.3, -0.4, -0.2)
+    rows, refused = profile_rows([finger], 1.0, (), "finger", ["a.csv"])
+    assert not rows and "finger" in refused[0].verdict
+    rows, refused = profile_rows([finger], 1.0, (), "forehead", ["a.csv"])
+    assert not refused and rows["anger"][0].region == "forehead" and rows["anger"][0].value < 0.0
+    at_cheeks = [finger, ANGER]
+    rows, refused = profile_rows(at_cheeks, 1.0, (), "cheeks", ["a.csv"])
+    assert [row.value > 0.0 for row in rows["anger"]] == [True] and "analyser" in refused[0].verdict
+
+
+def test_more_than_skin_can_change_is_left_out():
+    rows, refused = profile_rows([Measured("anger", "hemoglobin_index", "cheeks", 9, 6.0, 5.0, 7.0)], 1.0, (), "finger", ["a.csv"])
+    assert not rows and "more than skin can change" in refused[0].verdict
+    for region in ANATOMY:
+        for quantity in ("hemoglobin", "oxygenation"):
+            low, high = room(region, quantity)
+            assert low < 0.0 < high and at_rest(region, quantity) + low > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "anger"', 'name = "angry"', "emotion: angry: no such emotion, did you mean 'anger'?"),
+        ('region = "cheeks"', 'region = "cheek"', "anger cheek hemoglobin: no such region, did you mean 'cheeks'?"),
+        ("value = 0.00546", "value = 0.5", "anger cheeks hemoglobin: value 0.5 is not between low 0.00364 and high 0.00728"),
+        ("value = 0.00546, low = 0.00364, high = 0.00728", "value = 0.5, low = 0.4, high = 0.6", "0.5 is more than skin can change"),
+        ("value = 0.00546", "value = nan", "emotion.0.change.0.value: Input should be a finite number"),
+        ('source = ["a.csv"]', 'source = ["b.csv"]', "source: b.csv: not among the recordings, did you mean 'a.csv'?"),
+        ('magnitude = "measured"', 'magnitude = "guess"', "emotion.0.change.0.magnitude: Input should be 'measured'"),
+        ("format = 1", "format = 2", "format: Input should be 1"),
+        ("format = 1", "formt = 1", "format: missing"),
+        ("subjects = 12", "subjects = 12\nsubject = 1", "subject: unknown key, did you mean 'subjects'?"),
+        ("0" * 64, "0" * 63, "recording.0.sha256"),
+    ],
+)  # fmt: skip
+def test_a_broken_profile_says_what_to_mend(tmp_path, old, new, message):
+    path = tmp_path / "p.toml"
+    write_profile(path, profile(profile_rows([ANGER], 1.0, (), "finger", ["a.csv"])[0]))
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        read_profile(path)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+
+
+def test_a_row_given_twice(tmp_path):
+    rows, _ = profile_rows([ANGER], 1.0, (), "finger", ["a.csv"])
+    write_profile(tmp_path / "p.toml", profile({"anger": rows["anger"] * 2}))
+    with pytest.raises(InputError, match="anger cheeks hemoglobin: given twice, remove one"):
+        read_profile(tmp_path / "p.toml")
