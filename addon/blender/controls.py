@@ -26,6 +26,7 @@ from ..domain.facs import (
     Formulas,
     formulas,
 )
+from ..domain.naming import mesh_responses, recognise
 from ..domain.response import MAX_EXPRESSION, Formula, driver_text
 
 CONTROL_BONE = "sanguine"
@@ -65,7 +66,8 @@ CONTROLS: dict[str, Control] = {
 class DriveReport:
     """What became of the shape keys that the controls know.
 
-    `occupied` lists "mesh: key" for keys left alone because something else drives them already. `still` lists the
+    `driven` are names on the meshes, `missing` ARKit keys that none of them expresses. `notes`: keys known but not used,
+    and why. `occupied` lists "mesh: key" for keys left alone because something else drives them already. `still` lists the
     action units that move none of the keys driven.
     """
 
@@ -73,6 +75,7 @@ class DriveReport:
     missing: tuple[str, ...]
     occupied: tuple[str, ...]
     still: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def add_controls(
@@ -168,33 +171,38 @@ def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> Non
 
 
 def drive_shape_keys(armature: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> DriveReport:
-    """Drives every known shape key of `meshes` from the controls. Doing it twice changes nothing.
+    """Drives every shape key of `meshes` whose name is known (rigs/names/) from the controls. Doing it twice changes
+    nothing; after an emotion was put on the rig or taken off it, do it again.
 
     A key that someone else drives is left alone. Raises ValueError when a driver cannot be made, naming the key.
     """
-    responses = _formulas(armature).keys
-    wanted, occupied = [], []
+    wanted, occupied, notes, expressed = [], [], [], set()
     for mesh in meshes:
         keys = getattr(mesh.data, "shape_keys", None)
-        for name in responses:
-            if keys is None or name not in keys.key_blocks:
-                continue
-            path = f'key_blocks["{name}"].value'
+        if keys is None:
+            continue
+        found = recognise(keys.key_blocks.keys())
+        notes += [f"{mesh.name}: {note}" for note in found.notes]
+        for name, response in mesh_responses(found, _formulas(armature), emotions_of(armature)).items():
+            path = f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
             existing = _driver(keys, path)
             if existing and not _listens_to(existing, armature):
                 occupied.append(f"{mesh.name}: {name}")
+            elif len(driver_text(response)[0]) >= MAX_EXPRESSION:
+                notes.append(f"{mesh.name}: {name}: not driven, it is made of more than fits in a driver")
             else:
-                wanted.append((keys, path, name))
-    driven = {name for _, _, name in wanted}
-    units = {unit for name in driven for unit in responses[name].controls()}
-    _drive_units(armature, units)
-    for keys, path, name in wanted:
-        drive(keys, path, responses[name], armature)
+                wanted.append((keys, path, name, response))
+                expressed |= found.expressed([name])
+    _drive_units(armature, {control for _, _, _, response in wanted for control in response.controls()})
+    for keys, path, _, response in wanted:
+        drive(keys, path, response, armature)
+    driven = {name for _, _, name, _ in wanted}
     return DriveReport(
-        driven=tuple(name for name in SHAPE_KEYS if name in driven),
-        missing=tuple(name for name in SHAPE_KEYS if name not in driven),
+        driven=(*(name for name in SHAPE_KEYS if name in driven), *sorted(driven - set(SHAPE_KEYS))),
+        missing=tuple(name for name in SHAPE_KEYS if name not in expressed),
         occupied=tuple(occupied),
-        still=tuple(unit.id for unit in ACTION_UNITS.values() if not driven & set(unit.keys)),
+        still=tuple(unit.id for unit in ACTION_UNITS.values() if not expressed & set(unit.keys)),
+        notes=tuple(notes),
     )
 
 

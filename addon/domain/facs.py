@@ -284,6 +284,13 @@ def _add_unit(properties: dict[str, Formula], unit: ActionUnit, emotions: tuple[
         properties[f"unit_{side}"] = Response(tuple((1.0, name) for name in (*own, *asked)))
 
 
+def unit_alone(control: str, emotions: Iterable[str]) -> Response:
+    """What a unit's own slider and these emotions ask of it, for a key that stands beside the rest of the face: neither
+    its sides nor other units count."""
+    curves = [_curve(name, EMOTIONS[name].units[control[2:]]) for name in emotions if control[2:] in EMOTIONS[name].units]
+    return Response(((1.0, control), *(term for curve in curves for term in curve)))
+
+
 def _short_sums(curves: list[tuple[tuple[float, str | Formula], ...]]) -> list[Sum]:
     """The sum of the curves in as many parts as drivers need."""
     sums: list[Sum] = []

@@ -16,8 +16,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from .errors import InputError, nearest
-from .facs import ACTION_UNITS, ARKIT, EMOTION_CONTROLS, EMOTIONS, UNIT_CONTROLS, side_of
+from .facs import ACTION_UNITS, ARKIT, EMOTION_CONTROLS, EMOTIONS, UNIT_CONTROLS, Formulas, side_of, unit_alone
 from .resources import Row, read_table, rigs_path
+from .response import Formula, Response
 
 # A key that is moved by two of ours at half their value each has shares of 0.5; more than 2 would be a unit of another kind.
 Share = Annotated[float, Field(gt=0.0, le=2.0)]
@@ -179,7 +180,7 @@ class Recognised:
     absent     : mesh keys known to have no counterpart -> why
     spare      : mesh keys known but not used, as others move the same part of the face already -> which
     ambiguous  : name in the convention -> the mesh keys that could be it. The best spelled one is used, none if they tie.
-    notes      : lines for a user
+    notes      : one line for a user about each that is spare or ambiguous
     """
 
     convention: str | None
@@ -207,6 +208,11 @@ class Recognised:
     def emotions(self) -> dict[str, Shares]:
         """Mesh key -> shares of emotions: keys that are whole expressions."""
         return self._made_of(frozenset(EMOTION_CONTROLS))
+
+    def expressed(self, keys: Iterable[str]) -> frozenset[str]:
+        """The ARKit keys whose work these mesh keys do, whole expressions apart."""
+        names = [name for key in keys for name, _ in self.mapping[key] if name not in EMOTIONS]
+        return frozenset(_claims(names))
 
     def _made_of(self, kind: frozenset[str]) -> dict[str, Shares]:
         parts = {key: {name: share for name, share in row if name in kind} for key, row in self.mapping.items()}
@@ -301,8 +307,7 @@ class Recogniser:
                 claimed |= dict.fromkeys(claims, key)
             reached = {**claimed, **reached}
         best = ranked[0] if ranked and mapping else None
-        used = {name for row in mapping.values() for name, _ in row if name not in EMOTIONS}
-        expressed = {claim for name in used for claim in _claims({name: 1.0})}
+        expressed = set(_claims(name for row in mapping.values() for name, _ in row if name not in EMOTIONS))
         unknown = tuple(key for key in keys if key in left or key not in found)
         missing = tuple(key for key in ARKIT.keys if key not in expressed)
         return Recognised(
@@ -315,7 +320,7 @@ class Recogniser:
             absent={key: absent[key] for key in keys if key in absent},
             spare=spare,
             ambiguous=ambiguous,
-            notes=_notes(mapping, missing, spare, ambiguous),
+            notes=_notes(mapping, spare, ambiguous),
         )
 
     def _ranked(self, found: Mapping[str, tuple[int, list[_Entry]]]) -> list[int]:
@@ -423,10 +428,8 @@ def _claims(shares: Iterable[str]) -> tuple[str, ...]:
     return tuple(claims)
 
 
-def _notes(mapping, missing, spare, ambiguous) -> tuple[str, ...]:
+def _notes(mapping, spare, ambiguous) -> tuple[str, ...]:
     notes = []
-    if mapping and missing:
-        notes.append(f"{len(missing)} of {len(ARKIT.keys)} ARKit keys are expressed by nothing on this mesh")
     for key, others in spare.items():
         notes.append(f"{key}: not used, {others[0]} moves the same part of the face")
     for name, keys in ambiguous.items():
@@ -443,3 +446,32 @@ def _recogniser() -> Recogniser:
 def recognise(key_names: Iterable[str], extra: Mapping[str, Names] | None = None) -> Recognised:
     """What the shape keys of a mesh are. `extra`: conventions of one's own by name (`read_names`), which come first."""
     return (Recogniser({**extra, **conventions()}) if extra else _recogniser())(key_names)
+
+
+def mesh_responses(found: Recognised, formulas: Formulas, emotions: Iterable[str]) -> dict[str, Response]:
+    """Mesh key -> how the controls of a rig with these `emotions` move it. A key made only of what no control moves
+    (mouthLeft) is not in it.
+
+    An emotion that has a key of its own moves it and not, once more, the parts of expressions beside it.
+    """
+    emotions = tuple(emotions)
+    whole = {name for shares in found.emotions.values() for name in shares}
+    others = tuple(name for name in emotions if name not in whole)
+    responses = {}
+    for key, row in found.mapping.items():
+        terms: list[tuple[float, str | Formula]] = []
+        for name, share in row:
+            if name in formulas.keys:
+                terms.append((share, formulas.keys[name]))
+            elif name in emotions:
+                terms.append((share, name))
+            elif name in UNIT_CONTROLS and whole:
+                terms.append((share, unit_alone(name, others)))
+            elif name in UNIT_CONTROLS:
+                sides = [side for side in ACTION_UNITS[name[2:].rstrip("LR")].sides if name[-1] not in "LR" or f"AU{side}" == name]
+                terms += [(share / len(sides), formulas.units[side]) for side in sides]
+        if len(terms) == 1 and terms[0][0] == 1.0 and isinstance(terms[0][1], Response):
+            responses[key] = terms[0][1]
+        elif terms:
+            responses[key] = Response(tuple(terms))
+    return responses
