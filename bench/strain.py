@@ -39,7 +39,7 @@ def poses(moving: strain.MovingSurface) -> dict[str, np.ndarray]:
     return {
         "emotions": strain.poses(names, [{name: 1.0} for name in EMOTION_CONTROLS]),
         "half emotions": strain.poses(names, [{name: 0.5} for name in EMOTION_CONTROLS]),
-        "action units": strain.poses(names, [{control: 1.0} for unit in ACTION_UNITS.values() for control in unit.whole]),
+        "action units": strain.poses(names, [{control: 1.0} for unit in ACTION_UNITS.values() if unit.keys for control in unit.whole]),
         "mixes of four units": strain.poses(
             names, [{ACTION_UNITS[unit].control: value for unit, value in mix.items()} for mix in mixes]
         ),

@@ -6,16 +6,19 @@ and as a library override. That is why every driver is a simple expression and n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX, STATES
 from ..domain.errors import InputError, nearest
 from ..domain.facs import (
     ACTION_UNITS,
+    ARKIT,
     DEFAULT_EMOTIONS,
     EMOTION_CONTROLS,
     EMOTION_MAX,
@@ -27,7 +30,8 @@ from ..domain.facs import (
     formulas,
 )
 from ..domain.naming import mesh_responses, recognise
-from ..domain.response import MAX_EXPRESSION, Formula, driver_text
+from ..domain.response import MAX_EXPRESSION, Formula, Sum, driver_text
+from .curves import curves
 
 CONTROL_BONE = "sanguine"
 
@@ -66,9 +70,9 @@ CONTROLS: dict[str, Control] = {
 class DriveReport:
     """What became of the shape keys that the controls know.
 
-    `driven` are names on the meshes, `missing` ARKit keys that none of them expresses. `notes`: keys known but not used,
-    and why. `occupied` lists "mesh: key" for keys left alone because something else drives them already. `still` lists the
-    action units that move none of the keys driven.
+    `driven` are names on the meshes, `missing` ARKit keys that a unit would move and none of them expresses. `notes`:
+    keys known but not used, and why. `occupied` lists "mesh: key" for keys left alone because something else drives them
+    already. `still` lists the action units of face and eyes that move none of the keys driven.
     """
 
     driven: tuple[str, ...]
@@ -199,11 +203,56 @@ def drive_shape_keys(armature: bpy.types.Object, meshes: Iterable[bpy.types.Obje
     driven = {name for _, _, name, _ in wanted}
     return DriveReport(
         driven=(*(name for name in SHAPE_KEYS if name in driven), *sorted(driven - set(SHAPE_KEYS))),
-        missing=tuple(name for name in SHAPE_KEYS if name not in expressed),
+        missing=tuple(name for name in SHAPE_KEYS if name in ARKIT.keys and name not in expressed),
         occupied=tuple(occupied),
-        still=tuple(unit.id for unit in ACTION_UNITS.values() if not expressed & set(unit.keys)),
+        still=tuple(unit.id for unit in ACTION_UNITS.values() if unit.keys and not expressed & set(unit.keys)),
         notes=tuple(notes),
     )
+
+
+def drive_head(armature: bpy.types.Object, bone: str = "head") -> str:
+    """Turns a bone by the units of the head (51-58). Returns why it cannot, one line, "" when it can.
+
+    The bone's own rotation and location then belong to the units: a bone that somebody has animated or driven is
+    left alone.
+    """
+    if bone not in armature.pose.bones:
+        return f"no bone '{bone}': the head's units move nothing"
+    head = armature.pose.bones[bone]
+    stem = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
+    animation = armature.animation_data
+    paths = {curve.data_path for curve in curves(armature)} if animation and animation.action else set()
+    paths |= {c.data_path for c in animation.drivers if not _listens_to(c, armature)} if animation else set()
+    if taken := sorted(path for path in paths if path.startswith((f"{stem}rotation", f"{stem}location"))):
+        return f"{taken[0]}: animated already, so the head's units leave the bone alone"
+    moves = _formulas(armature).head
+    _drive_units(armature, {unit for formula in moves.values() for unit in formula.controls()})
+    head.rotation_mode = "YXZ"
+    axes = np.array(armature.data.bones[bone].matrix_local.to_3x3()).T  # rows: the bone's own axes in the armature
+    # The subject looks along -Y, Z up: a turn to the left is about +Z, a nod down about +X, a tilt to the left about +Y.
+    for field, kind, axis, unit in (
+        ("nod_degrees", "rotation_euler", (1, 0, 0), math.radians(1.0)),
+        ("tilt_degrees", "rotation_euler", (0, 1, 0), math.radians(1.0)),
+        ("turn_degrees", "rotation_euler", (0, 0, 1), math.radians(1.0)),
+        ("forward_mm", "location", (0, -1, 0), 0.001),
+    ):
+        along = axes @ np.array(axis, dtype=float)
+        index = int(np.abs(along).argmax())
+        formula = Sum(tuple((round(w * unit * float(np.sign(along[index])), 6), part) for w, part in moves[field].terms))
+        drive(armature, f"{stem}{kind}", formula, armature, index)
+    return ""
+
+
+def remove_head_drivers(armature: bpy.types.Object, bone: str = "head") -> None:
+    """Removes the drivers of `drive_head` and sets the bone back to rest."""
+    if bone not in armature.pose.bones or not armature.animation_data:
+        return
+    head = armature.pose.bones[bone]
+    stem = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
+    for curve in [c for c in armature.animation_data.drivers if c.data_path.startswith(stem) and _listens_to(c, armature)]:
+        getattr(head, curve.data_path.removeprefix(stem))[curve.array_index] = 0.0
+        armature.driver_remove(curve.data_path, curve.array_index)
+    _drive_units(armature)
 
 
 def remove_shape_key_drivers(armature: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> None:
@@ -295,13 +344,14 @@ def _edit_bones(armature: bpy.types.Object) -> Iterator[bpy.types.ArmatureEditBo
         objects.active = active
 
 
-def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.Object) -> None:
-    """Drives `path` of `owner` by a formula of controls. Raises ValueError, naming the path, where Blender cannot."""
+def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.Object, index: int = -1) -> None:
+    """Drives `path` (of an array: its element `index`) of `owner` by a formula of controls. Raises ValueError, naming
+    the path, where Blender cannot."""
     expression, variables = driver_text(formula)
     if len(expression) >= MAX_EXPRESSION:
         raise ValueError(f"{path}: driver of {len(expression)} characters, Blender keeps {MAX_EXPRESSION - 1}: split it")
-    owner.driver_remove(path)
-    curve = owner.driver_add(path)
+    owner.driver_remove(path, index)
+    curve = owner.driver_add(path, index)
     curve.keyframe_points.clear()  # the default curve is an identity that rounds; without keys the value passes as it is
     driver = curve.driver
     driver.type = "SCRIPTED"
@@ -312,7 +362,7 @@ def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.
         variable.targets[0].data_path = _target_path(control)
     driver.expression = expression
     if not (driver.is_valid and driver.is_simple_expression):
-        owner.driver_remove(path)
+        owner.driver_remove(path, index)
         raise ValueError(f"{path}: Blender does not take this as a simple expression: {expression}")
 
 

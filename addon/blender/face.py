@@ -11,7 +11,7 @@ from ..app.faces import example_head
 from ..domain.facs import DEFAULT_EMOTIONS
 from ..domain.head import load_presets
 from ..domain.resources import rigs_path
-from .controls import add_controls, drive_shape_keys
+from .controls import add_controls, drive_head, drive_shape_keys
 from .head import build_face
 from .surface import store_regions
 
@@ -40,5 +40,6 @@ def add_face(head_id: str, emotions: Iterable[str] = DEFAULT_EMOTIONS, states: I
     store_regions(objects.skin, head.regions)
     add_controls(objects.rig, emotions, states)
     drive_shape_keys(objects.rig, objects.parts.values())
+    drive_head(objects.rig)
     landmarks = {name: tuple(float(x) for x in place) for name, place in head.landmarks.items()}
     return Face(objects.skin, objects.rig, landmarks)

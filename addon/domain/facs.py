@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .errors import InputError, nearest
+from .own_keys import OWN_KEY_NAMES
 from .resources import Row, read_table, rigs_path
 from .response import MAX_EXPRESSION, Above, Formula, Product, Response, Sum, driver_text
 
@@ -45,6 +46,16 @@ def side_of(key: str) -> str:
     return "L" if "Left" in key else "R" if "Right" in key else ""
 
 
+class HeadMove(Row):
+    """What a unit does to the head bone at full intensity, in the subject's own view: turned to the left, nodded down,
+    tilted to the left, pushed forward."""
+
+    turn_degrees: float = 0.0
+    nod_degrees: float = 0.0
+    tilt_degrees: float = 0.0
+    forward_mm: float = 0.0
+
+
 class ActionUnit(Row):
     """One unit of rigs/action_units.toml.
 
@@ -54,13 +65,16 @@ class ActionUnit(Row):
     id: Annotated[str, Field(pattern=r"^\d+$")]
     name: str
     muscles: Annotated[tuple[str, ...], Field(min_length=1)]
-    keys: Annotated[dict[str, Weight], Field(min_length=1)]
+    keys: dict[str, Weight] = {}
+    head: HeadMove | None = None
     fit: Literal["same", "near", "weak"]
     one_sided: bool = False
     note: str = ""
 
     @model_validator(mode="after")
     def _has_both_sides(self) -> ActionUnit:
+        if not self.keys and self.head is None:
+            raise ValueError(f"unit {self.id}: keys: none, and no head: a unit that shows nothing is [[inexpressible]]")
         if {side_of(key) for key in self.keys} & {"L", "R"} not in (set(), {"L", "R"}):
             raise ValueError(f"unit {self.id}: keys: has those of one side only")
         return self
@@ -187,7 +201,8 @@ def _stem(key: str) -> str:
 
 
 ARKIT: ArkitKeys = read_table(rigs_path("arkit.toml"), ArkitKeys)
-UNIT_TABLE: UnitTable = read_action_units(rigs_path("action_units.toml"), ARKIT.keys)
+KNOWN_KEYS: tuple[str, ...] = (*ARKIT.keys, *OWN_KEY_NAMES)
+UNIT_TABLE: UnitTable = read_action_units(rigs_path("action_units.toml"), KNOWN_KEYS)
 ACTION_UNITS: dict[str, ActionUnit] = {unit.id: unit for unit in UNIT_TABLE.unit}
 EMOTIONS: dict[str, Emotion] = read_emotions(rigs_path("emotions.toml"), ACTION_UNITS)
 
@@ -235,14 +250,16 @@ class Formulas:
                  (`sum_12` what the emotions ask of unit 12, `unit_12L` its left side, 0-1)
     units      : side of a unit -> what is left of it beside the others, of properties
     keys       : shape key -> its value, of properties
+    head       : field of HeadMove -> how far the head bone goes, of properties
     """
 
     properties: dict[str, Formula]
     units: dict[str, Formula]
     keys: dict[str, Response]
+    head: dict[str, Formula]
 
     def values(self, of: Mapping[str, Formula], controls: Mapping[str, float]) -> dict[str, float]:
-        """The numbers of `units` or `keys` for these control values."""
+        """The numbers of `units`, `keys` or `head` for these control values."""
         known = dict(controls)
         for name, formula in self.properties.items():
             known[name] = formula.value(known)
@@ -266,7 +283,17 @@ def formulas(emotions: tuple[str, ...] = EMOTION_CONTROLS, sided: bool = True) -
     for unit in ACTION_UNITS.values():
         _add_unit(properties, unit, emotions, sided)
     units = {side: Product((f"unit_{side}", *_factors(side))) for unit in ACTION_UNITS.values() for side in unit.sides}
-    return Formulas(properties, units, _key_responses())
+    head = {
+        field: Sum(
+            tuple(
+                (getattr(unit.head, field), Product((f"unit_{unit.id}", *_factors(unit.id))))
+                for unit in ACTION_UNITS.values()
+                if unit.head and getattr(unit.head, field)
+            )
+        )
+        for field in HeadMove.model_fields
+    }
+    return Formulas(properties, units, _key_responses(), head)
 
 
 def _add_unit(properties: dict[str, Formula], unit: ActionUnit, emotions: tuple[str, ...], sided: bool) -> None:
@@ -338,7 +365,7 @@ def _key_responses() -> dict[str, Response]:
             for side in sides:
                 group = groups.setdefault(key, {}).setdefault(_factors(side, key), [])
                 group.append((weight / len(sides), f"unit_{side}"))
-    order = [key for key in ARKIT.keys if key in groups]
+    order = [key for key in KNOWN_KEYS if key in groups]
     return {key: Response(tuple(term for group in groups[key].items() for term in _terms(*group))) for key in order}
 
 
@@ -362,3 +389,8 @@ def unit_values(controls: Mapping[str, float]) -> dict[str, float]:
 def shape_key_values(controls: Mapping[str, float]) -> dict[str, float]:
     """The value of every shape key for these emotions and action units."""
     return formulas().values(formulas().keys, controls)
+
+
+def head_values(controls: Mapping[str, float]) -> dict[str, float]:
+    """How far the head is turned (field of HeadMove -> degrees or mm) for these emotions and action units."""
+    return formulas().values(formulas().head, controls)

@@ -16,7 +16,17 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from .errors import InputError, nearest
-from .facs import ACTION_UNITS, ARKIT, EMOTION_CONTROLS, EMOTIONS, UNIT_CONTROLS, Formulas, side_of, unit_alone
+from .facs import (
+    ACTION_UNITS,
+    ARKIT,
+    EMOTION_CONTROLS,
+    EMOTIONS,
+    KNOWN_KEYS,
+    UNIT_CONTROLS,
+    Formulas,
+    side_of,
+    unit_alone,
+)
 from .resources import Row, read_table, rigs_path
 from .response import Formula, Response
 
@@ -79,7 +89,7 @@ class Names(Row):
 
     def rows(self) -> dict[str, KeyRow]:
         """All rows, those of `identity` included."""
-        own = {"": (), "arkit": ARKIT.keys, "units": UNIT_CONTROLS}[self.identity]
+        own = {"": (), "arkit": KNOWN_KEYS, "units": UNIT_CONTROLS}[self.identity]
         return {**{name: KeyRow(of={name: 1.0}) for name in own}, **self.keys}
 
 
@@ -90,9 +100,9 @@ def _short_row(row: Any) -> Any:
 
 
 def known_targets() -> frozenset[str]:
-    """What a foreign key may be made of: the ARKit keys, action units (`AU12`, `AU12L`: the names of their sliders),
+    """What a foreign key may be made of: the ARKit keys and our own, action units (`AU12`, `AU12L`: the names of their sliders),
     emotions."""
-    return frozenset((*ARKIT.keys, *UNIT_CONTROLS, *EMOTION_CONTROLS))
+    return frozenset((*KNOWN_KEYS, *UNIT_CONTROLS, *EMOTION_CONTROLS))
 
 
 def form(name: str) -> str:
@@ -421,7 +431,7 @@ def _claims(shares: Iterable[str]) -> tuple[str, ...]:
             claims |= dict.fromkeys(_claims(f"AU{unit}" for unit, share in full.items() if share >= 0.5))
         elif name.startswith("AU"):
             keys, side = ACTION_UNITS[name[2:].rstrip("LR")].keys, name[-1] if name[-1] in "LR" else ""
-            strong = [key for key, share in keys.items() if share >= 0.5 * max(keys.values())]
+            strong = [key for key, share in keys.items() if share >= 0.5 * max(keys.values(), default=0.0)]
             claims |= dict.fromkeys(key for key in strong if not side or side_of(key) in ("", side))
         else:
             claims[name] = None

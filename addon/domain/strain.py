@@ -238,7 +238,7 @@ def _asked_for(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Poses (P, K) that the components have to serve, and how much each counts (P,)."""
     # Patterns are found on the whole face and driven by halves: one-sided poses would split them.
     emotions = _on_both_sides(names, poses(names, [{name: 1.0} for name in EMOTION_CONTROLS]))
-    units = poses(names, [{control: 1.0} for u in ACTION_UNITS.values() if not u.one_sided for control in u.whole])
+    units = poses(names, [{control: 1.0} for u in ACTION_UNITS.values() if u.keys and not u.one_sided for control in u.whole])
     weights = (_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT)
     rows = (emotions, units, np.eye(len(names)))
     return np.concatenate(rows), np.concatenate([np.full(len(r), w) for r, w in zip(rows, weights, strict=True)])

@@ -1,5 +1,6 @@
 """In Blender: the drivers compute what the domain computes, survive saving and linking, and leave no trace."""
 
+import math
 import subprocess
 import sys
 import textwrap
@@ -8,6 +9,7 @@ import bpy
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mathutils import Vector
 
 from sanguine.blender import blood, controls
 from sanguine.domain.blood import BLOOD_CHANNELS, BLOOD_CONTROL_MAX, blood_change
@@ -89,6 +91,12 @@ def test_drivers_equal_the_domain_for_any_mix(face, values):
         assert changes[channel.property_name] == pytest.approx(change, abs=1e-6)
 
 
+def face_properties(emotions=EMOTION_CONTROLS):
+    """All but those of units that turn the head."""
+    rig = formulas(tuple(emotions))
+    return rig.needed(unit for response in rig.keys.values() for unit in response.controls())
+
+
 def drivers_of(*owners):
     return [curve for owner in owners if owner.animation_data for curve in owner.animation_data.drivers]
 
@@ -96,7 +104,7 @@ def drivers_of(*owners):
 def test_every_driver_is_a_short_simple_expression(face):
     armature, skin = face
     assert len(drivers_of(skin, skin.data.shape_keys)) == len(SHAPE_KEYS) + len(BLOOD_CHANNELS)
-    assert {curve.data_path[2:-2] for curve in drivers_of(armature)} == set(formulas().properties)
+    assert {curve.data_path[2:-2] for curve in drivers_of(armature)} == set(face_properties())
     for curve in drivers_of(armature, skin, skin.data.shape_keys):
         assert curve.driver.is_valid and curve.driver.is_simple_expression, curve.data_path
         assert len(curve.driver.expression) < 255
@@ -120,7 +128,7 @@ def test_an_emotion_costs_nothing_before_it_is_on_the_rig_and_leaves_nothing_beh
     controls.drive_shape_keys(armature, [skin])
     assert controls.emotions_of(armature) == () and "anger" not in bone
     bare = texts(armature, keys)
-    assert len(bare) == len(SHAPE_KEYS) + len(formulas(()).properties)
+    assert len(bare) == len(SHAPE_KEYS) + len(face_properties(()))
     controls.set_controls(armature, {"AU12": 0.5})
     bone["AU4"] = 0.25
     bone.keyframe_insert('["AU4"]', frame=3)
@@ -194,9 +202,9 @@ def test_missing_and_occupied_keys_are_reported_and_left_alone():
     skin.data.shape_keys.key_blocks["browInnerUp"].driver_add("value").driver.expression = "0.25"
     report = controls.drive_shape_keys(armature, [skin, teeth, armature])
     assert report.driven == ("jawOpen",)
-    assert set(report.missing) == set(SHAPE_KEYS) - {"jawOpen"}
+    assert set(report.missing) == (set(SHAPE_KEYS) & set(ARKIT.keys)) - {"jawOpen"}
     assert report.occupied == ("skin: browInnerUp",)
-    assert set(report.still) == set(ACTION_UNITS) - {"26", "27"}
+    assert set(report.still) == {unit.id for unit in ACTION_UNITS.values() if unit.keys} - {"26", "27"}
     reads = formulas(DEFAULT_EMOTIONS).needed(formulas().keys["jawOpen"].controls())
     assert {key for key in armature.keys()} == set(reads), "no more than the keys that are there ask for"
     assert controls.drive_shape_keys(armature, [skin, teeth, armature]) == report
@@ -234,6 +242,56 @@ def test_adding_twice_keeps_what_was_set(face):
 def test_a_wrong_control_is_refused(face, name, value, message):
     with pytest.raises(InputError, match=message):
         controls.set_controls(face[0], {name: value})
+
+
+def head_rig():
+    """An armature with a head bone that leans back by 10 degrees."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature = add_armature()
+    bpy.context.view_layer.update()
+    with controls._edit_bones(armature) as bones:
+        bone = bones.new("head")
+        bone.head, bone.tail = (0, 0, 1.5), (0, 0.2 * math.sin(math.radians(10)), 1.5 + 0.2 * math.cos(math.radians(10)))
+    return armature
+
+
+@pytest.mark.parametrize(
+    ("units", "moves"),
+    [
+        ({"AU51": 1.0}, lambda m: m["front"].x > 0.5),
+        ({"AU52": 1.0}, lambda m: m["front"].x < -0.5),
+        ({"AU53": 1.0}, lambda m: m["front"].z > 0.35),
+        ({"AU54": 1.0}, lambda m: m["front"].z < -0.35),
+        ({"AU55": 1.0}, lambda m: m["top"].x > 0.35),
+        ({"AU56": 1.0}, lambda m: m["top"].x < -0.35),
+        ({"AU57": 1.0}, lambda m: -0.026 < m["place"].y - m["rest"].y < -0.02),
+        ({"AU58": 1.0}, lambda m: 0.016 < m["place"].y - m["rest"].y < 0.021),
+        ({"AU51": 1.0, "AU52": 1.0}, lambda m: abs(m["front"].x) < 1e-5),
+    ],
+)
+def test_the_head_goes_where_the_units_say(units, moves):
+    """The subject looks along -Y: its left is +X."""
+    armature = head_rig()
+    controls.add_controls(armature)
+    assert controls.drive_head(armature) == ""
+    controls.set_controls(armature, units)
+    pose = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["head"]
+    rest = armature.data.bones["head"].matrix_local
+    turn = (pose.matrix @ rest.inverted()).to_3x3()
+    assert moves({"front": turn @ Vector((0, -1, 0)), "top": turn @ Vector((0, 0, 1)),
+                  "place": pose.matrix.translation, "rest": rest.translation})  # fmt: skip
+    controls.remove_head_drivers(armature)
+    assert not armature.animation_data and not armature.keys()
+    assert all(v == 0.0 for v in (*armature.pose.bones["head"].rotation_euler, *armature.pose.bones["head"].location))
+
+
+def test_a_head_bone_that_is_animated_is_left_alone():
+    armature = head_rig()
+    controls.add_controls(armature)
+    armature.pose.bones["head"].keyframe_insert("rotation_quaternion", frame=1)
+    assert "animated already" in controls.drive_head(armature)
+    assert "no bone 'skull'" in controls.drive_head(armature, "skull")
+    assert armature.pose.bones["head"].rotation_mode == "QUATERNION" and not armature.animation_data.drivers
 
 
 KEYED_ELSEWHERE = """

@@ -8,7 +8,7 @@ from mathutils import Euler
 
 from sanguine.blender.head import CONTROL_BONE, build_face
 from sanguine.blender.stage import set_stage
-from sanguine.domain.head import ARKIT_NAMES, build_head, load_presets, load_regions
+from sanguine.domain.head import KEY_NAMES, build_head, load_presets, load_regions
 from sanguine.domain.resources import rigs_path
 
 
@@ -53,7 +53,7 @@ def test_meshes_are_valid_and_stand_where_the_domain_put_them(face, head):
 
 def test_shape_keys_bear_arkits_names_and_rest_at_zero(face, head):
     names = {key for obj in face.parts.values() for key in obj.data.shape_keys.key_blocks.keys()}
-    assert names == {"Basis", *ARKIT_NAMES}
+    assert names == {"Basis", *KEY_NAMES}
     for part in head.parts:
         blocks = face.parts[part.name].data.shape_keys.key_blocks
         assert list(blocks.keys()) == ["Basis", *part.shape_keys]

@@ -172,7 +172,8 @@ def test_what_is_not_on_the_mesh_is_not_found(skin):
 def test_the_table_is_that_of_the_base_mesh():
     """Each landmark again from the unshaped mesh and the package's own keys, rounded to 0.1 mm."""
     package = HeadPackage()
-    base, units = package.base_mesh(), package.face_units()
+    base = package.base_mesh()
+    units = package.face_units(base.vertices)
     bust = cut_bust(base)
     origin = np.concatenate([base.vertices[base.vertices_of(f"helper-{s}-eye")] for s in "lr"]).mean(axis=0)
     mm = (base.vertices[bust.source] - origin).astype(float) * 1000

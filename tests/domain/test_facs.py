@@ -15,17 +15,20 @@ from sanguine.domain.facs import (
     EMOTION_MAX,
     EMOTIONS,
     INTENSITIES,
+    KNOWN_KEYS,
     SHAPE_KEYS,
     UNIT_CONTROLS,
     UNIT_TABLE,
     VARIANTS,
     emotion_units,
     formulas,
+    head_values,
     read_action_units,
     read_emotions,
     shape_key_values,
     unit_values,
 )
+from sanguine.domain.own_keys import OWN_KEY_NAMES
 from sanguine.domain.resources import rigs_path
 from sanguine.domain.response import MAX_EXPRESSION, driver_text
 
@@ -43,7 +46,7 @@ def other_side(name: str) -> str:
     return re.sub("Left|Right", lambda side: "Right" if side[0] == "Left" else "Left", name)
 
 
-OPPOSITE = {"61": "62", "62": "61"}
+OPPOSITE = {"51": "52", "52": "51", "55": "56", "56": "55", "61": "62", "62": "61"}
 """Units that turn to a side mirror each other; all others are their own mirror image."""
 
 
@@ -68,10 +71,38 @@ def test_every_arkit_key_is_driven_or_excused():
     assert all(ARKIT.unreached.values())
 
 
+FACS_2002 = """1 2 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36 37 38 39 40 43
+45 46 50 51 52 53 54 55 56 57 58 61 62 63 64 65 66 69 80 81 82 84 85 91 92 M55 M56 M57 M59 M60 M61 M62 M68 M69 M83"""
+"""The codes of the manual of 2002 but for those of visibility (70-74)."""
+
+
+def test_every_code_of_the_manual_is_a_unit_or_excused():
+    inexpressible = {row.id for row in UNIT_TABLE.inexpressible}
+    assert set(ACTION_UNITS) | inexpressible == set(FACS_2002.split())
+    assert not set(ACTION_UNITS) & inexpressible
+    assert all(len(row.reason) > 10 for row in UNIT_TABLE.inexpressible)
+
+
+def test_every_own_key_is_driven_and_its_unit_says_so():
+    assert set(OWN_KEY_NAMES) <= set(SHAPE_KEYS) and not set(OWN_KEY_NAMES) & set(ARKIT.keys)
+    assert {other_side(key) for key in OWN_KEY_NAMES} == set(OWN_KEY_NAMES)
+
+
+def test_the_head_turns_as_its_units_say():
+    assert head_values({"AU51": 0.5, "AU54": 1.0})["turn_degrees"] == pytest.approx(20.0)
+    assert head_values({"AU51": 0.5, "AU54": 1.0})["nod_degrees"] == pytest.approx(25.0)
+    assert head_values({"AU57": 1.0, "AU58": 1.0})["forward_mm"] == 0.0
+    assert set(head_values({"anger": 1.0}).values()) == {0.0}
+
+
 def test_every_unit_has_its_mirror_image():
     for unit in ACTION_UNITS.values():
         mirror = ACTION_UNITS[OPPOSITE.get(unit.id, unit.id)]
         assert {other_side(key): weight for key, weight in unit.keys.items()} == mirror.keys, unit.id
+        if unit.head:
+            there, back = unit.head, mirror.head
+            assert (there.turn_degrees, there.tilt_degrees) == (-back.turn_degrees, -back.tilt_degrees)
+            assert (there.nod_degrees, there.forward_mm) == (back.nod_degrees, back.forward_mm)
 
 
 def test_interferences_have_their_mirror_image():
@@ -196,7 +227,7 @@ def test_an_interference_may_reach_only_some_keys():
 def test_every_text_fits_a_driver():
     for emotions in (EMOTION_CONTROLS, DEFAULT_EMOTIONS, ()):
         rig = formulas(emotions)
-        for name, formula in (rig.properties | rig.keys).items():
+        for name, formula in (rig.properties | rig.keys | rig.head).items():
             text, variables = driver_text(formula)
             assert len(text) < MAX_EXPRESSION, name
             assert set(variables.values()) <= {*rig.properties, *UNIT_CONTROLS, *emotions}
@@ -241,7 +272,7 @@ def test_a_broken_unit_table_says_what_to_mend(tmp_path, old, new, message):
     broken = tmp_path / "action_units.toml"
     broken.write_text(rigs_path("action_units.toml").read_text().replace(old, new, 1))
     with pytest.raises(InputError) as caught:
-        read_action_units(broken, ARKIT.keys)
+        read_action_units(broken, KNOWN_KEYS)
     assert str(caught.value).startswith(f"{broken}: ") and message in str(caught.value)
     assert "\n" not in str(caught.value)
 

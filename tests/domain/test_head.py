@@ -8,7 +8,7 @@ import pytest
 import sanguine_core
 
 from sanguine.domain.errors import InputError
-from sanguine.domain.head import ARKIT_NAMES, HeadError, HeadPackage, build_head, load_presets, load_regions
+from sanguine.domain.head import KEY_NAMES, HeadError, HeadPackage, build_head, load_presets, load_regions
 from sanguine.domain.head.bust import cut_bust
 from sanguine.domain.facs import shape_key_values
 from sanguine.domain.head.eyes import GAZE_M, fit_sphere
@@ -61,14 +61,14 @@ def test_locating_a_point_gives_back_the_point():
 
 
 def test_every_arkit_key_moves_something_and_no_key_is_empty(head):
-    assert {name for part in head.parts for name in part.shape_keys} == set(ARKIT_NAMES)
+    assert {name for part in head.parts for name in part.shape_keys} == set(KEY_NAMES)
     for part in head.parts:
         for name, key in part.shape_keys.items():
             assert key.indices.size and np.isfinite(key.delta).all(), (part.name, name)
 
 
 def test_keys_move_the_parts_that_anatomy_moves(head):
-    movers = {name: {part.name for part in head.parts if name in part.shape_keys} for name in ARKIT_NAMES}
+    movers = {name: {part.name for part in head.parts if name in part.shape_keys} for name in KEY_NAMES}
     assert {"skin", "teeth", "tongue"} <= movers["jawOpen"]
     assert movers["tongueOut"] == {"tongue"}
     assert {"skin", "lashes", "tears"} <= movers["eyeBlinkLeft"]

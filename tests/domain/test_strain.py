@@ -172,7 +172,7 @@ def test_sums_of_keys_fit_blenders_expressions_and_lose_nothing():
 
 
 def test_every_action_unit_of_the_face_moves_some_skin(moving):
-    rows = strain.poses(moving.keys.names, [{control: 1.0} for unit in ACTION_UNITS.values() for control in unit.whole])
+    rows = strain.poses(moving.keys.names, [{control: 1.0} for unit in ACTION_UNITS.values() if unit.keys for control in unit.whole])
     assert rows.shape[1] == len(moving.keys.names) and (rows.sum(axis=1) > 0).mean() > 0.9
 
 

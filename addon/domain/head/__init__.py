@@ -2,7 +2,7 @@
 
 from .build import build_head
 from .model import Head, MeshPart, ShapeKey, StrandPart
-from .package import ARKIT_NAMES, HeadError, HeadPackage
+from .package import ARKIT_NAMES, KEY_NAMES, HeadError, HeadPackage
 from .presets import Preset, load_presets
 from .regions import Region, load_regions
 
@@ -11,6 +11,7 @@ __all__ = [
     "Head",
     "HeadError",
     "HeadPackage",
+    "KEY_NAMES",
     "MeshPart",
     "Preset",
     "Region",

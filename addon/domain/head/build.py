@@ -11,7 +11,7 @@ from . import eyes, hair, lips, strands, teeth
 from .bust import SLOTS as SKIN_SLOTS
 from .bust import Bust, cut_bust, round_edge
 from .model import Head, MeshPart, shape_keys
-from .package import ARKIT_NAMES, LICENCE, BaseMesh, HeadPackage
+from .package import KEY_NAMES, LICENCE, BaseMesh, HeadPackage
 from .presets import Preset
 from .regions import ImageReader, Region, region_weights
 from .surface import Binding, Subdivision, edges_of, unit, vertex_normals
@@ -43,7 +43,7 @@ class Person:
     """The base mesh in the shape of a preset.
 
     vertices : (19158, 3) metres, neutral
-    units    : (52, 19158, 3) what each ARKit unit moves from there
+    units    : (K, 19158, 3) what each key of KEY_NAMES moves from there
     """
 
     base: BaseMesh
@@ -59,7 +59,7 @@ class Person:
 class FineSkin:
     """The skin as it is rendered, near enough: subdivided once. What grows on the skin is rooted here, not on the cage.
 
-    base     : (W, 3) unshaped; vertices (W, 3) in the preset's shape; units (52, W, 3); faces (G, 4)
+    base     : (W, 3) unshaped; vertices (W, 3) in the preset's shape; units (K, W, 3); faces (G, 4)
     """
 
     base: np.ndarray
@@ -69,17 +69,18 @@ class FineSkin:
 
 
 def shape(package: HeadPackage, preset: Preset) -> Person:
-    base, units = package.base_mesh(), package.face_units()
+    base = package.base_mesh()
+    units = package.face_units(base.vertices)
     mend(units, base.vertices)
     vertices = base.vertices.copy()
     for name, weight in preset.morphs.items():
         index, delta = package.morph(name)
         vertices[index] += np.float32(weight) * delta
     for name, weight in preset.rest.items():
-        resting = units[ARKIT_NAMES.index(name)]
+        resting = units[KEY_NAMES.index(name)]
         vertices += np.float32(weight) * resting
         if name.startswith("eyeWide"):  # a lid that rests wide has farther to go to close
-            units[ARKIT_NAMES.index(name.replace("Wide", "Blink"))] -= np.float32(weight) * resting
+            units[KEY_NAMES.index(name.replace("Wide", "Blink"))] -= np.float32(weight) * resting
         resting *= np.float32(1 - weight)
     return Person(base, vertices, units)
 
@@ -93,7 +94,7 @@ def refine(person: Person, bust: Bust, skin: np.ndarray, subdivide: Subdivision)
 
 
 def carry(binding: Binding, units: np.ndarray) -> np.ndarray:
-    """Displacements (52, N, 3) at points bound to a mesh with displacements (52, V, 3)."""
+    """Displacements (K, N, 3) at points bound to a mesh with displacements (K, V, 3)."""
     moves = np.moveaxis(units, 0, 1).reshape(units.shape[1], -1)
     return np.moveaxis(binding(moves).reshape(len(binding.index), len(units), 3), 0, 1)
 
@@ -117,7 +118,7 @@ def _part(
     vertices, faces, moves = _join(pieces)
     uv = np.zeros((*faces.shape, 2), np.float32) if uv is None else uv.astype(np.float32)
     material = np.zeros(len(faces), np.int32) if material is None else material
-    return MeshPart(name, vertices, faces, uv, material, slots, shape_keys(ARKIT_NAMES, moves), subdivision)
+    return MeshPart(name, vertices, faces, uv, material, slots, shape_keys(KEY_NAMES, moves), subdivision)
 
 
 def globes(person: Person) -> dict[str, tuple[np.ndarray, float]]:
@@ -136,7 +137,7 @@ def _eyes(person: Person, balls: dict[str, tuple[np.ndarray, float]]) -> MeshPar
         vertices, faces, uv, material = eyes.eyeball(centre, radius - eyes.FILM_M, target)
         guide = person.base.vertices_of(f"helper-{side}-eye")
         moves = eyes.carried(vertices, person.vertices[guide], person.units[:, guide])
-        moves[ARKIT_NAMES.index(f"eyeBlink{name}")] += np.float32([0, eyes.BLINK_RETRACTION_M, 0])
+        moves[KEY_NAMES.index(f"eyeBlink{name}")] += np.float32([0, eyes.BLINK_RETRACTION_M, 0])
         pieces.append((vertices, faces, moves))
         uvs.append(uv)
         materials.append(material)
@@ -177,7 +178,7 @@ def _tongue(person: Person) -> MeshPart:
 
 
 def _hairs(name: str, spine: np.ndarray, up: np.ndarray, radius: np.ndarray, moves: list[np.ndarray]) -> MeshPart:
-    """A tube around each spine (N, K, 3); `moves` are displacements of the spine points, (52, N*K, 3) in pieces."""
+    """A tube around each spine (N, K, 3); `moves` are displacements of the spine points, (keys, N*K, 3) in pieces."""
     vertices, faces, owner = strands.tubes(spine, up, radius)
     return _part(name, (name,), [(vertices, faces, np.concatenate(moves, axis=1)[:, owner])])
 

@@ -24,7 +24,7 @@ class MeshPart:
     uv          : (F, 4, 2) float32, one per face corner
     material    : (F,) int32, into `slots`
     slots       : names of the looks, in slot order
-    shape_keys  : ARKit name -> displacement; only the keys that move this part
+    shape_keys  : name (ARKit's or of rigs/own_keys.toml) -> displacement; only the keys that move this part
     subdivision : Catmull-Clark levels at which the part is meant to be rendered
     """
 

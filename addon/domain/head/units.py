@@ -47,7 +47,7 @@ MENDS = (
 
 
 def mend(units: np.ndarray, base: np.ndarray) -> None:
-    """Mends units (52, V, 3) in place; `base` (V, 3) is the unshaped mesh, metres."""
+    """Mends units (K, V, 3) in place, the first of which are ARKit's; `base` (V, 3) is the unshaped mesh, metres."""
     from_middle = np.abs(base[:, 0]) * 1e3
     for row in MENDS:
         factor = np.interp(from_middle, *np.array(row.gain).T).astype(np.float32)
