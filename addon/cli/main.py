@@ -71,6 +71,22 @@ def _parser() -> argparse.ArgumentParser:
                      help="let these go where the data lead, for example melanin_blend or bilirubin_umol_per_l")
     fit.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    capture = _verb(verbs, "capture", _capture, "a recorded face (Live Link Face, OpenFace, MediaPipe) as curves on the controls")
+    capture.add_argument("recording", metavar="FILE.csv")
+    capture.add_argument("--fps", type=_positive, default=24.0, metavar="X",
+                         help="frames per second of the scene (default %(default)s)")
+    capture.add_argument("--smooth", type=_seconds, default=0.0, metavar="S",
+                         help="window of the smoothing in seconds, 0.1 takes a tracker's noise; no delay (default none)")
+    capture.add_argument("--emotions", default="on", metavar="on|off|NAME,…",
+                         help="infer these from the action units, for the blood; on: anger, happy, sad, fear (default %(default)s)")
+    capture.add_argument("--head", default="on", choices=("on", "off"),
+                         help="the turns of the head as units 51 to 56 (default %(default)s)")
+    capture.add_argument("--source-fps", type=_positive, metavar="X",
+                         help="the recording's rate, where the file does not tell the time")
+    capture.add_argument("--reduce", type=_share, default=0.0, metavar="X",
+                         help="leave out keys as long as no value is off by more than X (default: a key on every frame)")
+    capture.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     invert = _verb(verbs, "invert", _invert, "melanin, hemoglobin and oxygenation maps from a colour map")
     invert.add_argument("albedo", metavar="ALBEDO", help="a picture; face.1001.png or 'face.<UDIM>.png' is the whole set")
     invert.add_argument("--out-dir", required=True, metavar="DIR",
@@ -219,6 +235,23 @@ def _fit(options: argparse.Namespace) -> int:
     if options.specular == "auto":
         print(f"sanguine: specular taken as {report['specular']} (--specular says otherwise)", file=sys.stderr)
     _answer(report, options.out)
+    return 0
+
+
+def _capture(options: argparse.Namespace) -> int:
+    from ..app.capture import capture, capture_report
+    from ..domain.facs import DEFAULT_EMOTIONS
+    from ..domain.files import check_file
+
+    check_file(options.out)
+    named = tuple(name for name in options.emotions.split(",") if name)
+    emotions = {"on": DEFAULT_EMOTIONS, "off": ()}.get(options.emotions, named)
+    performance = capture(
+        options.recording, options.fps, options.smooth, emotions, options.source_fps, options.reduce, options.head == "on"
+    )
+    for note in performance.notes:
+        print(f"sanguine: {note}", file=sys.stderr)
+    _answer(capture_report(performance), options.out)
     return 0
 
 

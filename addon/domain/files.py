@@ -25,12 +25,12 @@ MAX_TEXT_BYTES = 16 * 1024 * 1024
 Model = TypeVar("Model", bound=pydantic.BaseModel)
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """Text of `path`. Raises InputError when it is missing, unreadable, too large or not UTF-8."""
+def read_text(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES) -> str:
+    """Text of `path`. Raises InputError when it is missing, unreadable, larger than `max_bytes` or not UTF-8."""
     try:
         size = os.stat(path).st_size
-        if size > MAX_TEXT_BYTES:
-            raise InputError(f"{path}: {size} bytes: more than the {MAX_TEXT_BYTES} a text input may have")
+        if size > max_bytes:
+            raise InputError(f"{path}: {size} bytes: more than the {max_bytes} a text input may have")
         return Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
