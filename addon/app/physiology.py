@@ -32,6 +32,7 @@ from ..domain.physiology.measures import MEASURES
 from ..domain.physiology.recording import NEUTRAL, Recording, Track, read_recording
 from ..domain.physiology.statistics import CONFIDENCE, Effect
 from ..domain.profile import (
+    FINGER,
     FORMAT,
     Calibration,
     EmotionRows,
@@ -39,11 +40,8 @@ from ..domain.profile import (
     Profile,
     RecordingRow,
     UnsupportedRow,
-    at_rest,
     profile_rows,
 )
-
-FINGER = "finger"
 
 
 @dataclass(frozen=True)
@@ -54,20 +52,19 @@ class Settings:
     ignore: tuple[str, ...] = ()
     lag_s: float | None = None
     settling: Settling = Settling()
-    regions: tuple[str, ...] = ()
-    oximeter: str = FINGER
-    index_gain: float = 1.0
+    calibration: Calibration = Calibration()
     profile_of: str = POOLED
 
     def __post_init__(self) -> None:
         for name, emotion in self.labels.items():
             if emotion not in EMOTIONS:
                 raise InputError(f"--labels: {name}={emotion}: no such emotion, {nearest(emotion, EMOTIONS)}")
-        for region in self.regions:
+        for region in self.calibration.index_region:
             if region not in ANATOMY:
                 raise InputError(f"--region: {region}: no such region, {nearest(region, ANATOMY)}")
-        if self.oximeter != FINGER and self.oximeter not in ANATOMY:
-            raise InputError(f"--oximeter: {self.oximeter}: neither finger nor a region, {nearest(self.oximeter, (FINGER, *ANATOMY))}")
+        site = self.calibration.oximeter
+        if site != FINGER and site not in ANATOMY:
+            raise InputError(f"--oximeter: {site}: neither finger nor a region, {nearest(site, (FINGER, *ANATOMY))}")
         if self.lag_s is not None and not 0.0 <= self.lag_s <= 300.0:
             raise InputError(f"--lag-s: {self.lag_s:g} is outside 0 to 300 s")
         for flag, value, low in (
@@ -77,8 +74,6 @@ class Settings:
         ):
             if not low <= value <= 3600.0:
                 raise InputError(f"{flag}: {value:g} is outside {low:g} to 3600 s")
-        if not 0.0 < self.index_gain <= 100.0:
-            raise InputError(f"--gain: {self.index_gain:g} is not above 0 and at most 100")
 
 
 @dataclass(frozen=True)
@@ -353,12 +348,12 @@ def make_profile(done: Study) -> Profile:
         if f.supported and f.measure in used
     ]  # fmt: skip
     nowhere = next((f for f in own if f.measure == "hemoglobin_index" and not f.region), None)
-    if nowhere is not None and not settings.regions:
+    if nowhere is not None and not settings.calibration.index_region:
         raise InputError(
             f"--profile: the hemoglobin index has no region: a column 'region', or --region {nearest('', ANATOMY)}"
         )
     files = [recording.file for recording in done.recordings]
-    rows, refused = profile_rows(measured, settings.index_gain, settings.regions, settings.oximeter, files)
+    rows, refused = profile_rows(measured, settings.calibration, files)
     refused += [
         UnsupportedRow(emotion=f.emotion, measure=f.measure, region=f.region, verdict=f.verdict)
         for f in own
@@ -372,14 +367,7 @@ def make_profile(done: Study) -> Profile:
         sanguine=sanguine_core.__version__,
         sex=settings.profile_of,
         subjects=len(people),
-        calibration=Calibration(
-            index_gain=settings.index_gain,
-            index_region=settings.regions,
-            oximeter=settings.oximeter,
-            reference_hemoglobin=at_rest("", "hemoglobin"),
-            note="an index is taken to change by the share that blood does, times index_gain; "
-            + ("a gain of 1 is a guess" if settings.index_gain == 1.0 else "index_gain is the user's"),
-        ),
+        calibration=settings.calibration,
         recording=tuple(RecordingRow(file=r.file, sha256=r.sha256, samples=r.rows) for r in done.recordings),
         emotion=tuple(EmotionRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
         unsupported=tuple(refused),

@@ -136,8 +136,13 @@ def _parser() -> argparse.ArgumentParser:
                             help="where the skin analyser sat, if the recording has no column 'region'")
     physiology.add_argument("--oximeter", default="finger", metavar="SITE",
                             help="finger, or the region of the face it sat on, whose blood its perfusion index then tells")
-    physiology.add_argument("--gain", type=_positive, default=1.0, metavar="X",
-                            help="relative change of blood per relative change of an index (default %(default)s: a guess)")
+    physiology.add_argument("--index", default="linear", choices=("linear", "erythema"),
+                            help="what the hemoglobin index is: linear in blood, or a logarithm of red over green, which "
+                                 "Sanguine's optics turn into blood (default %(default)s)")
+    physiology.add_argument("--gain", type=_gain, default=1.0, metavar="X",
+                            help="relative change of blood per relative change of a linear index (default %(default)s: a guess)")
+    physiology.add_argument("--melanin", type=_melanin, default=0.018, metavar="X",
+                            help="of the subjects, for --index erythema (default %(default)s: light skin)")
     physiology.add_argument("--labels", default="", metavar="OWN=EMOTION,…", help="the recording's own words for emotions")
     physiology.add_argument("--ignore", default="", metavar="COLUMN,…", help="columns to leave out")
     physiology.add_argument("--lag-s", default="auto", metavar="auto|X",
@@ -315,7 +320,7 @@ def _physiology(options: argparse.Namespace) -> int:
     from ..app.physiology_plots import write_plots
     from ..domain.files import check_file, check_folder
     from ..domain.physiology.cleaning import Settling
-    from ..domain.profile import write_profile
+    from ..domain.profile import Calibration, write_profile
     from .progress import reporter
 
     check_packages(options.plots is not None)
@@ -332,7 +337,10 @@ def _physiology(options: argparse.Namespace) -> int:
     settings = Settings(
         labels=_pairs(options.labels, "--labels"), ignore=tuple(filter(None, options.ignore.split(","))), lag_s=lag_s,
         settling=Settling(options.settle_s, options.recover_s, options.window_s),
-        regions=tuple(filter(None, options.region.split(","))), oximeter=options.oximeter, index_gain=options.gain,
+        calibration=Calibration(
+            index=options.index, index_gain=options.gain, melanin=options.melanin,
+            index_region=tuple(filter(None, options.region.split(","))), oximeter=options.oximeter,
+        ),
         profile_of=options.sex,
     )
     recordings = read_recordings(options.recordings, settings)
@@ -462,6 +470,20 @@ def _positive(text: str) -> float:
     value = _number(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
+    return value
+
+
+def _gain(text: str) -> float:
+    value = _number(text)
+    if not 0.0 < value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0 and at most 100")
+    return value
+
+
+def _melanin(text: str) -> float:
+    value = _number(text)
+    if not 0.0 <= value <= 0.5:
+        raise argparse.ArgumentTypeError(f"{text} is not 0 to 0.5, a volume fraction of the epidermis")
     return value
 
 

@@ -14,15 +14,22 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Literal
 
+import numpy as np
+import sanguine_core
 from pydantic import Field
 
 from .blood import ANATOMY, BLOOD_CONTROL_MAX, Quantity, Reference, Rest, Sources
 from .errors import InputError, nearest
 from .facs import EMOTION_CONTROLS
 from .files import atomic, read_toml, validate
+from .parameters import PARAMETERS, default_skin, skin_rows
 from .resources import Row, rigs_path
 
 FORMAT = 1
+FINGER = "finger"
+
+# Green, where hemoglobin absorbs, and red, where it hardly does: the diodes of a Mexameter (remembered).
+_GREEN_NM, _RED_NM = 568.0, 660.0
 
 
 class RecordingRow(Row):
@@ -34,14 +41,19 @@ class RecordingRow(Row):
 
 
 class Calibration(Row):
-    """How indices became units: change of blood volume fraction = index_gain x relative change of the index x
-    reference_hemoglobin x the region's factor at rest."""
+    """How indices became units.
 
-    index_gain: Annotated[float, Field(gt=0.0, le=100.0)]
-    index_region: tuple[str, ...]
-    oximeter: str
-    reference_hemoglobin: float
-    note: str
+    index: of the skin analyser. "linear" changes by the share that blood does, times index_gain. "erythema" is the
+    logarithm of the ratio of red to green reflectance (Diffey 1984), whose blood Sanguine's own optics find, on skin with
+    this melanin. A perfusion index is linear. index_region: where an index was taken that names no region. oximeter:
+    "finger" or a region.
+    """
+
+    index: Literal["linear", "erythema"] = "linear"
+    index_gain: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
+    melanin: Annotated[float, Field(ge=0.0, le=0.5)] = 0.018
+    index_region: tuple[str, ...] = ()
+    oximeter: str = FINGER
 
 
 class ProfileRow(Row):
@@ -147,50 +159,80 @@ class Measured:
     high: float
 
 
+def blood_change(calibration: Calibration, measure: str, region: str, relative: float) -> float:
+    """Change of the blood volume fraction that a relative change of an index stands for; infinite where no blood gives it."""
+    rest = at_rest(region, "hemoglobin")
+    if measure != "hemoglobin_index" or calibration.index == "linear":
+        return calibration.index_gain * rest * relative
+    blood, index = _erythema(calibration.melanin, region)
+    wanted = (1.0 + relative) * float(np.interp(rest, blood, index))
+    return float(np.interp(wanted, index, blood, left=-math.inf, right=math.inf)) - rest
+
+
+@lru_cache(maxsize=64)
+def _erythema(melanin: float, region: str) -> tuple[np.ndarray, np.ndarray]:
+    """(blood volume fractions, erythema index of the region's skin at rest with so much blood), both rising: up to where
+    so much blood takes the red away too."""
+    rest = ANATOMY.get(region, Rest())
+    blood = np.geomspace(1e-4, PARAMETERS["hemoglobin"].hard_max, 200)
+    skin = default_skin() | {
+        "melanin": min(melanin * rest.melanin, PARAMETERS["melanin"].hard_max),
+        "oxygenation": at_rest(region, "oxygenation"),
+        "oil": 0.0,
+    }
+    rows = skin_rows([skin | {"hemoglobin": fraction} for fraction in blood])
+    green, red = sanguine_core.reflectance(rows, np.array([_GREEN_NM, _RED_NM])).T
+    index = np.log10(red / green)
+    rising = int(np.argmax(np.append(np.diff(index) <= 0.0, True))) + 1
+    return blood[:rising], index[:rising]
+
+
 def profile_rows(
-    changes: Sequence[Measured], index_gain: float, index_regions: Sequence[str], oximeter: str, sources: Sequence[str]
+    changes: Sequence[Measured], calibration: Calibration, sources: Sequence[str]
 ) -> tuple[dict[str, list[ProfileRow]], list[UnsupportedRow]]:
     """(emotion -> rows, what cannot become one).
 
-    A hemoglobin index, or the perfusion index of an oximeter on the face, changes by the share that blood does, times
-    index_gain. A finger's perfusion says nothing of the face: it narrows while the face flushes (Drummond and Quah
-    2001). A change of SpO2 is one of arterial blood, which adds to the oxygenation of all skin at constant extraction;
-    it is a hundredth or less, which no eye sees.
-
-    index_regions: where an index without a region was taken. oximeter: "finger" or a region.
+    A finger's perfusion says nothing of the face: it narrows while the face flushes (Drummond and Quah 2001). A change
+    of SpO2 is one of arterial blood, which adds to the oxygenation of all skin at constant extraction; it is a hundredth
+    or less, which no eye sees.
     """
     rows: dict[str, list[ProfileRow]] = {}
     refused: list[UnsupportedRow] = []
     taken: set[tuple[str, str, str]] = set()
 
-    def add(change: Measured, region: str, quantity: Quantity, factor: float, note: str) -> None:
+    def add(change: Measured, region: str, quantity: Quantity, note: str) -> None:
+        numbers = {}
+        for key in ("value", "low", "high"):
+            number = getattr(change, key)
+            numbers[key] = blood_change(calibration, change.measure, region, number) if quantity == "hemoglobin" else number
         low, high = room(region, quantity)
-        value = change.value * factor
         if (change.emotion, region, quantity) in taken:
             refused.append(_refusal(change, region, "not used: the analyser's index of the same region stands"))
-        elif not low <= value <= high:
-            refused.append(_refusal(change, region, f"not used: {value:.4g} is more than skin can change ({low:.4f} to {high:.4f})"))
+        elif not low <= numbers["value"] <= high:
+            allowed = f"({low:.4f} to {high:.4f})"
+            refused.append(_refusal(change, region, f"not used: {numbers['value']:.4g} is more than skin can change {allowed}"))
         else:
             taken.add((change.emotion, region, quantity))
-            numbers = {key: _rounded(getattr(change, key) * factor) for key in ("value", "low", "high")}
+            # An end of the interval that no skin reaches is as far as skin goes.
+            numbers = {key: _rounded(min(max(number, low), high)) for key, number in numbers.items()}
             row = ProfileRow(region=region, quantity=quantity, magnitude="measured", source=tuple(sources), note=note, **numbers)
             rows.setdefault(change.emotion, []).append(row)
 
     for change in sorted(changes, key=lambda c: ("hemoglobin_index", "perfusion", "spo2").index(c.measure)):
         if change.measure == "spo2":
             for region in ANATOMY:
-                add(change, region, "oxygenation", 1.0, f"SpO2 {100 * change.value:+.2f} % points, {change.subjects} subjects")
+                add(change, region, "oxygenation", f"SpO2 {100 * change.value:+.2f} % points, {change.subjects} subjects")
             continue
-        at = (change.region,) if change.region else tuple(index_regions)
+        at = (change.region,) if change.region else calibration.index_region
         if change.measure == "perfusion":
-            at = (oximeter,) if oximeter in ANATOMY else ()
+            at = (calibration.oximeter,) if calibration.oximeter in ANATOMY else ()
             if not at:
-                refused.append(_refusal(change, oximeter, "not used: a finger's perfusion is not the face's"))
+                refused.append(_refusal(change, calibration.oximeter, "not used: a finger's perfusion is not the face's"))
         elif not at:
             refused.append(_refusal(change, "", "not used: the recording does not say where: a column region, or --region"))
         for region in at:
             note = f"{change.measure.replace('_', ' ')} {100 * change.value:+.1f} %, {change.subjects} subjects"
-            add(change, region, "hemoglobin", index_gain * at_rest(region, "hemoglobin"), note)
+            add(change, region, "hemoglobin", note)
     return rows, refused
 
 
@@ -200,7 +242,7 @@ def _refusal(change: Measured, region: str, verdict: str) -> UnsupportedRow:
 
 def _rounded(value: float) -> float:
     """To four significant digits: more than any study resolves."""
-    return float(f"{value:.4g}") if math.isfinite(value) else value
+    return float(f"{value:.4g}")
 
 
 def write_profile(path: str | os.PathLike[str], profile: Profile) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sanguine.app import physiology
 from sanguine.domain.blood import ANATOMY
 from sanguine.domain.errors import InputError
-from sanguine.domain.profile import read_profile
+from sanguine.domain.profile import Calibration, read_profile
 from support.sessions import INDEX, PERFUSION, PULSE, SPO2, Answer, Design, simulate, write_csv
 
 H = "hemoglobin_index"
@@ -114,6 +114,7 @@ HEADER = "time_s,subject,sex,emotion,spo2_percent"
         (None, ["--lag-s", "-3"], ["--lag-s", "-3"]),
         (None, ["--settle-s", "-3"], ["--settle-s", "-3"]),
         (None, ["--gain", "0"], ["--gain", "0"]),
+        (None, ["--melanin", "18"], ["--melanin", "18", "fraction"]),
         (None, ["--window-s", "0.01"], ["--window-s", "0.01"]),
         (None, ["--settle-s", "3000"], ["nothing to compare", "--settle-s"]),
     ],
@@ -150,7 +151,7 @@ def test_a_profile_needs_to_know_where_the_analyser_sat(tmp_path):
     done = physiology.study(physiology.read_recordings([path], options), options)
     with pytest.raises(InputError, match="--profile: the hemoglobin index has no region: .*--region"):
         physiology.make_profile(done)
-    there = dataclasses.replace(done, settings=physiology.Settings(regions=("cheeks", "nose")))
+    there = dataclasses.replace(done, settings=physiology.Settings(calibration=Calibration(index_region=("cheeks", "nose"))))
     assert {region for _, region, _ in physiology.make_profile(there).rows} == {"cheeks", "nose"}
 
 

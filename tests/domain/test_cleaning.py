@@ -75,11 +75,12 @@ def test_a_hanging_sensor_but_not_a_steady_one():
     assert counts(clean(track("hemoglobin_index", seldom, step_s=60.0))) == {}
 
 
-def test_hampel_finds_spikes():
+@pytest.mark.parametrize("step_s", [0.25, 1.0, 5.0, 10.0])
+def test_hampel_finds_spikes(step_s):
     value = noisy("hemoglobin_index")
     value[[40, 90, 91, 200]] *= 1.25
-    cleaned = clean(track("hemoglobin_index", value))
-    assert not np.isin([40, 90, 91, 200], cleaned.time_s).any()
+    cleaned = clean(track("hemoglobin_index", value, step_s))
+    assert not np.isin(np.array([40, 90, 91, 200]) * step_s, cleaned.time_s).any()
 
 
 def test_nothing_left_is_nothing():
@@ -91,8 +92,17 @@ def test_nothing_left_is_nothing():
 def test_blocks_last_until_the_next_label():
     t = track("pulse", [70.0] * 6, 10.0, ["neutral", "neutral", "anger", "", "anger", "anger"])
     assert blocks(t) == [
-        Block("neutral", 0.0, 20.0, ""), Block("anger", 20.0, 30.0, "neutral"), Block("anger", 40.0, 60.0, ""),
+        Block("neutral", 0.0, 20.0, -np.inf), Block("anger", 20.0, 30.0, -np.inf), Block("anger", 40.0, 60.0, 30.0),
     ]  # fmt: skip
+
+
+def test_rest_counts_once_the_last_emotion_is_over_whatever_lies_between():
+    settling = Settling(settle_s=15.0, recover_s=60.0)
+    assert settling.begin_s(Block("neutral", 100.0, 200.0, -np.inf)) == 115.0
+    assert settling.begin_s(Block("neutral", 100.0, 200.0, 100.0)) == 160.0
+    assert settling.begin_s(Block("neutral", 100.0, 200.0, 80.0)) == 140.0  # 20 s without a label before
+    assert settling.begin_s(Block("neutral", 100.0, 200.0, 10.0)) == 115.0
+    assert settling.begin_s(Block("anger", 100.0, 200.0, 80.0)) == 115.0
 
 
 def test_levels_leave_out_what_settles_and_follow_the_lag():

@@ -2,9 +2,12 @@
 
 import re
 
+import numpy as np
 import pytest
+import sanguine_core
 from sanguine.domain.blood import ANATOMY
 from sanguine.domain.errors import InputError
+from sanguine.domain.parameters import default_skin, skin_rows
 from sanguine.domain.profile import (
     Calibration,
     EmotionRows,
@@ -12,6 +15,7 @@ from sanguine.domain.profile import (
     Profile,
     RecordingRow,
     at_rest,
+    blood_change,
     profile_rows,
     read_profile,
     room,
@@ -24,7 +28,7 @@ ANGER = Measured("anger", "hemoglobin_index", "cheeks", 12, 0.30, 0.20, 0.40)
 def profile(rows, refused=(), file="a.csv"):
     return Profile(
         format=1, sanguine="0.1.0", sex="pooled", subjects=12, unsupported=tuple(refused),
-        calibration=Calibration(index_gain=1.0, index_region=("nose",), oximeter="finger", reference_hemoglobin=0.014, note="n"),
+        calibration=Calibration(index_region=("nose",)),
         recording=(RecordingRow(file=file, sha256="0" * 64, samples=9),),
         emotion=tuple(EmotionRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
     )  # fmt: skip
@@ -32,7 +36,7 @@ def profile(rows, refused=(), file="a.csv"):
 
 def test_a_profile_comes_back(tmp_path):
     file = 'odd "name" \\ é \x7f.csv'
-    rows, refused = profile_rows([ANGER, Measured("sad", "spo2", "", 9, -0.01, -0.015, -0.005)], 1.0, (), "finger", [file])
+    rows, refused = profile_rows([ANGER, Measured("sad", "spo2", "", 9, -0.01, -0.015, -0.005)], Calibration(), [file])
     written = profile(rows, refused, file)
     write_profile(tmp_path / "p.toml", written)
     assert read_profile(tmp_path / "p.toml") == written
@@ -43,28 +47,48 @@ def test_a_profile_comes_back(tmp_path):
 
 def test_an_index_becomes_blood_by_its_gain_where_it_was_taken():
     nowhere = Measured("fear", "hemoglobin_index", "", 8, -0.1, -0.15, -0.05)
-    rows, refused = profile_rows([nowhere], 2.0, ("cheeks", "lips"), "finger", ["a.csv"])
+    rows, refused = profile_rows([nowhere], Calibration(index_gain=2.0, index_region=("cheeks", "lips")), ["a.csv"])
     assert not refused and [row.region for row in rows["fear"]] == ["cheeks", "lips"]
     for row in rows["fear"]:
         rest = at_rest(row.region, "hemoglobin")
         assert (row.value, row.low, row.high) == pytest.approx((-0.2 * rest, -0.3 * rest, -0.1 * rest), rel=1e-3)
-    rows, refused = profile_rows([nowhere], 2.0, (), "finger", ["a.csv"])
+    rows, refused = profile_rows([nowhere], Calibration(index_gain=2.0), ["a.csv"])
     assert not rows and "where" in refused[0].verdict
 
 
 def test_a_finger_says_nothing_of_the_face():
     finger = Measured("anger", "perfusion", "", 12, -0.3, -0.4, -0.2)
-    rows, refused = profile_rows([finger], 1.0, (), "finger", ["a.csv"])
+    rows, refused = profile_rows([finger], Calibration(), ["a.csv"])
     assert not rows and "finger" in refused[0].verdict
-    rows, refused = profile_rows([finger], 1.0, (), "forehead", ["a.csv"])
+    rows, refused = profile_rows([finger], Calibration(oximeter="forehead"), ["a.csv"])
     assert not refused and rows["anger"][0].region == "forehead" and rows["anger"][0].value < 0.0
     at_cheeks = [finger, ANGER]
-    rows, refused = profile_rows(at_cheeks, 1.0, (), "cheeks", ["a.csv"])
+    rows, refused = profile_rows(at_cheeks, Calibration(oximeter="cheeks"), ["a.csv"])
     assert [row.value > 0.0 for row in rows["anger"]] == [True] and "analyser" in refused[0].verdict
 
 
+def test_an_erythema_index_is_turned_by_the_optics():
+    """The index of the model's own skin gives back its blood; its relative change is a third of the blood's or less."""
+    for melanin in (0.018, 0.1):
+        calibration = Calibration(index="erythema", melanin=melanin)
+        rest = at_rest("cheeks", "hemoglobin")
+        skins = [
+            default_skin() | {"melanin": melanin * ANATOMY["cheeks"].melanin, "hemoglobin": f, "oxygenation": 0.72, "oil": 0.0}
+            for f in (rest, 1.5 * rest, 0.7 * rest)
+        ]
+        green, red = sanguine_core.reflectance(skin_rows(skins), np.array([568.0, 660.0])).T
+        index = np.log10(red / green)
+        for k, factor in ((1, 1.5), (2, 0.7)):
+            relative = index[k] / index[0] - 1.0
+            # Linear between 200 blood contents 4 % apart, of a curve that bends by less than that: a part in a thousand.
+            assert blood_change(calibration, "hemoglobin_index", "cheeks", relative) == pytest.approx((factor - 1.0) * rest, rel=5e-3)
+            assert abs(relative) < abs(factor - 1.0) / 2.0
+        assert blood_change(calibration, "perfusion", "cheeks", 0.1) == pytest.approx(0.1 * rest)
+        assert blood_change(calibration, "hemoglobin_index", "cheeks", -0.99) == -np.inf
+
+
 def test_more_than_skin_can_change_is_left_out():
-    rows, refused = profile_rows([Measured("anger", "hemoglobin_index", "cheeks", 9, 6.0, 5.0, 7.0)], 1.0, (), "finger", ["a.csv"])
+    rows, refused = profile_rows([Measured("anger", "hemoglobin_index", "cheeks", 9, 6.0, 5.0, 7.0)], Calibration(), ["a.csv"])
     assert not rows and "more than skin can change" in refused[0].verdict
     for region in ANATOMY:
         for quantity in ("hemoglobin", "oxygenation"):
@@ -90,7 +114,7 @@ def test_more_than_skin_can_change_is_left_out():
 )  # fmt: skip
 def test_a_broken_profile_says_what_to_mend(tmp_path, old, new, message):
     path = tmp_path / "p.toml"
-    write_profile(path, profile(profile_rows([ANGER], 1.0, (), "finger", ["a.csv"])[0]))
+    write_profile(path, profile(profile_rows([ANGER], Calibration(), ["a.csv"])[0]))
     text = path.read_text(encoding="utf-8")
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -100,7 +124,7 @@ def test_a_broken_profile_says_what_to_mend(tmp_path, old, new, message):
 
 
 def test_a_row_given_twice(tmp_path):
-    rows, _ = profile_rows([ANGER], 1.0, (), "finger", ["a.csv"])
+    rows, _ = profile_rows([ANGER], Calibration(), ["a.csv"])
     write_profile(tmp_path / "p.toml", profile({"anger": rows["anger"] * 2}))
     with pytest.raises(InputError, match="anger cheeks hemoglobin: given twice, remove one"):
         read_profile(tmp_path / "p.toml")

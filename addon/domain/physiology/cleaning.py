@@ -22,8 +22,8 @@ REASONS = {
 # A sensor that finds the signal again needs a moment: samples this close to a drop-out are not believed (a guess).
 _GUARD_S = 2.0
 # Hampel: a sample is an outlier if it lies farther than 3 robust standard deviations (Pearson's rule) from the median of
-# itself and seven samples on each side. Fewer than that many neighbours within _NEAR_S are no surroundings.
-_SIDE, _SIGMAS, _NEAR_S = 7, 3.0, 30.0
+# itself and the samples on each side: seven, or as many as half a minute has. Fewer than three are no surroundings.
+_SIDE, _LEAST_SIDE, _SIGMAS, _NEAR_S = 7, 3, 3.0, 30.0
 _MAD_TO_SD = 1.4826  # of a normal distribution
 # The least number of equal samples that can be called frozen: an analyser may read the same twice.
 _FROZEN_SAMPLES = 10
@@ -109,14 +109,18 @@ def _frozen(measure: Measure, time: np.ndarray, value: np.ndarray) -> np.ndarray
 
 def _outliers(measure: Measure, time: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Hampel's identifier; its scale is at least the step in which the device counts."""
-    width = 2 * _SIDE + 1
-    if time.size < width:
+    if time.size < 2:
+        return np.zeros(time.size, bool)
+    side = min(_SIDE, int(_NEAR_S / np.median(np.diff(time)) + 1e-6))
+    width = 2 * side + 1
+    if side < _LEAST_SIDE or time.size < width:
         return np.zeros(time.size, bool)
     around = np.lib.stride_tricks.sliding_window_view(value, width)
-    index = np.clip(np.arange(time.size) - _SIDE, 0, time.size - width)
+    index = np.clip(np.arange(time.size) - side, 0, time.size - width)
     middle = np.median(around, axis=1)
     spread = _MAD_TO_SD * np.median(np.abs(around - middle[:, None]), axis=1)
-    close = (time[width - 1 :] - time[: 1 - width])[index] <= 2.0 * _NEAR_S
+    # Where samples are missing, the window reaches farther than the body stays the same.
+    close = (time[width - 1 :] - time[: 1 - width])[index] <= 4.0 * _NEAR_S
     steps = np.abs(np.diff(value))
     step = float(steps[steps > 1e-9 * max(1.0, np.abs(value).max())].min(initial=np.inf))
     spread = np.maximum(spread, step if np.isfinite(step) else 0.0)
@@ -125,12 +129,13 @@ def _outliers(measure: Measure, time: np.ndarray, value: np.ndarray) -> np.ndarr
 
 @dataclass(frozen=True)
 class Block:
-    """An unbroken stretch of one label: [start, end) in seconds, `after` the label before it ("" for none)."""
+    """An unbroken stretch of one label: [start, end) in seconds. moved_s: when the last emotion before it ended, -inf if
+    there was none."""
 
     emotion: str
     start_s: float
     end_s: float
-    after: str
+    moved_s: float
 
 
 def blocks(track: Track) -> list[Block]:
@@ -138,19 +143,22 @@ def blocks(track: Track) -> list[Block]:
     label, time = track.emotion, track.time_s
     first = np.flatnonzero(np.concatenate([[True], label[1:] != label[:-1]]))
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    ends = np.concatenate([time[first[1:]], [time[-1] + step]])
-    names = ["", *label[first]]
-    return [
-        Block(names[k + 1], float(time[i]), float(ends[k]), names[k]) for k, i in enumerate(first) if names[k + 1]
-    ]
+    starts = time[first].tolist()
+    found, moved = [], -np.inf
+    for emotion, start, end in zip(label[first], starts, [*starts[1:], float(time[-1]) + step], strict=True):
+        if emotion:
+            found.append(Block(emotion, start, end, moved))
+        if emotion not in ("", NEUTRAL):
+            moved = end
+    return found
 
 
 @dataclass(frozen=True)
 class Settling:
     """How the samples of a block become one number.
 
-    settle_s: left out after any label begins: the body is on its way. recover_s: instead of it, after a neutral label
-    that follows an emotion: blood comes back slowly. window_s: samples are averaged in windows of this length and the
+    settle_s: left out after any label begins: the body is on its way. recover_s: left out of neutral labels after an
+    emotion has ended: blood comes back slowly. window_s: samples are averaged in windows of this length and the
     block is the mean of its windows, so that a denser stretch counts no more. Defaults are guesses made from the time
     constants of a blush that are said to be 5-8 s up and 30-60 s down (no stored source).
     """
@@ -159,8 +167,10 @@ class Settling:
     recover_s: float = 60.0
     window_s: float = 5.0
 
-    def skipped_s(self, block: Block) -> float:
-        return self.recover_s if block.emotion == NEUTRAL and block.after not in ("", NEUTRAL) else self.settle_s
+    def begin_s(self, block: Block) -> float:
+        """Where a block is settled."""
+        calm = block.moved_s + self.recover_s if block.emotion == NEUTRAL else -np.inf
+        return max(block.start_s + self.settle_s, calm)
 
 
 @dataclass(frozen=True)
@@ -177,7 +187,7 @@ def levels(cleaned: Clean, lag_s: float, settling: Settling) -> list[Level]:
     """One level per block that has a window with at least half of its samples left; labels are moved by the sensor's lag."""
     found = []
     for block in blocks(cleaned.track):
-        start, end = block.start_s + lag_s + settling.skipped_s(block), block.end_s + lag_s
+        start, end = settling.begin_s(block) + lag_s, block.end_s + lag_s
         lo, hi = np.searchsorted(cleaned.time_s, (start, end))
         if hi <= lo:
             continue
