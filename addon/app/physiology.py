@@ -12,7 +12,7 @@ from typing import Any
 
 import sanguine_core
 
-from ..domain.blood import ANATOMY
+from ..domain.blood import ANATOMY, STATES
 from ..domain.errors import InputError, nearest
 from ..domain.facs import EMOTION_CONTROLS, EMOTIONS
 from ..domain.physiology.cleaning import REASONS, Clean, Level, Settling, blocks, clean, levels
@@ -21,9 +21,11 @@ from ..domain.physiology.estimates import (
     POOLED,
     Finding,
     PairFinding,
+    Residue,
     SubjectChange,
     change_findings,
     pair_findings,
+    rest_residue,
     sex_findings,
     subject_changes,
 )
@@ -35,13 +37,18 @@ from ..domain.profile import (
     FINGER,
     FORMAT,
     Calibration,
-    EmotionRows,
     Measured,
+    NamedRows,
     Profile,
     RecordingRow,
     UnsupportedRow,
     profile_rows,
 )
+
+
+def known_labels() -> list[str]:
+    """What a recording may be labelled with: emotions, neutral among them, and states of the body."""
+    return [*EMOTIONS, *STATES]
 
 
 @dataclass(frozen=True)
@@ -57,8 +64,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name, emotion in self.labels.items():
-            if emotion not in EMOTIONS:
-                raise InputError(f"--labels: {name}={emotion}: no such emotion, {nearest(emotion, EMOTIONS)}")
+            if emotion not in (known := known_labels()):
+                raise InputError(f"--labels: {name}={emotion}: no such emotion or state, {nearest(emotion, known)}")
         for region in self.calibration.index_region:
             if region not in ANATOMY:
                 raise InputError(f"--region: {region}: no such region, {nearest(region, ANATOMY)}")
@@ -86,12 +93,16 @@ class Study:
     levels: tuple[tuple[Level, ...], ...]
     lags: Mapping[str, Lag]
     used_lag_s: Mapping[str, float]
+    residues: Mapping[str, Residue]
     changes: tuple[SubjectChange, ...]
     findings: tuple[Finding, ...]
     sexes: tuple[Finding, ...]
     pairs: tuple[PairFinding, ...]
     warnings: tuple[str, ...]
 
+
+# Of a change, left in the rest: half of it is what baselines, and so changes, are off by; below, other errors are larger.
+_UNRESTED = 0.05
 
 Progress = Callable[[str, int, int], None]
 
@@ -108,7 +119,7 @@ def read_recordings(paths: Sequence[str | os.PathLike[str]], settings: Settings)
     recordings: list[Recording] = []
     sexes: dict[str, tuple[str, str]] = {}
     for path in paths:
-        recording = read_recording(path, list(EMOTIONS), list(ANATOMY), settings.labels, settings.ignore)
+        recording = read_recording(path, known_labels(), list(ANATOMY), settings.labels, settings.ignore)
         for other in recordings:
             if other.sha256 == recording.sha256:
                 raise InputError(f"{path}: the same samples as in {other.file}: give each file once")
@@ -145,6 +156,7 @@ def study(recordings: Sequence[Recording], settings: Settings, progress: Progres
             f"{recordings[0].file}: nothing to compare: no subject has a settled '{NEUTRAL}' and a settled emotion "
             "(--settle-s, --recover-s)"
         )
+    residues = _residues(cleaned, settled, warnings)
     if progress:
         progress("estimate", 0, 1)
     findings = [finding for group in GROUPS for finding in change_findings(changes, group)]
@@ -152,7 +164,7 @@ def study(recordings: Sequence[Recording], settings: Settings, progress: Progres
     if progress:
         progress("estimate", 1, 1)
     return Study(
-        settings, tuple(recordings), tuple(cleaned), tuple(settled), lags, used, tuple(changes), tuple(findings),
+        settings, tuple(recordings), tuple(cleaned), tuple(settled), lags, used, residues, tuple(changes), tuple(findings),
         tuple(sexes), tuple(pairs), tuple(warnings),
     )  # fmt: skip
 
@@ -221,6 +233,23 @@ def _lost_warnings(lost: Sequence[Track], cleaned: Sequence[Clean], settled: Seq
     return warnings
 
 
+def _residues(cleaned: Sequence[Clean], settled: Sequence[Sequence[Level]], warnings: list[str]) -> dict[str, Residue]:
+    residues = {}
+    for measure in MEASURES:
+        own = [(c.track, levels) for c, levels in zip(cleaned, settled, strict=True) if c.track.measure.id == measure]
+        residue = rest_residue(own)
+        if residue is None:
+            continue
+        residues[measure] = residue
+        if residue.low > _UNRESTED:
+            warnings.append(
+                f"{measure}: the rest after an emotion still holds {100 * residue.share:.0f} % of its change (95 % interval "
+                f"{100 * residue.low:.0f} to {100 * residue.high:.0f} %): changes are too small by half of that "
+                "(--recover-s, or longer rests)"
+            )
+    return residues
+
+
 def shown(measure: str, value: float | None) -> float | None:
     """A change as reports give it: a ratio less 1 for relative measures, else as it is."""
     if value is None:
@@ -253,6 +282,7 @@ def report(done: Study) -> dict[str, Any]:
             measure: {"used_s": used, "estimated": None if (lag := done.lags.get(measure)) is None else dataclasses.asdict(lag)}
             for measure, used in done.used_lag_s.items()
         },
+        "rest_residue": {measure: dataclasses.asdict(residue) for measure, residue in done.residues.items()},
         "changes": [_finding(finding) for finding in done.findings],
         "sex_differences": [_finding(finding) for finding in done.sexes],
         "correlations": [
@@ -337,7 +367,7 @@ def _human(measure: str, value: float) -> str:
 def make_profile(done: Study) -> Profile:
     """The supported changes of one group as rows of blood. Raises InputError if an index has no region to go to."""
     settings = done.settings
-    own = [f for f in done.findings if f.group == settings.profile_of and f.emotion in EMOTION_CONTROLS]
+    own = [f for f in done.findings if f.group == settings.profile_of]
     used = ("hemoglobin_index", "perfusion", "spo2")
     measured = [
         Measured(
@@ -369,6 +399,7 @@ def make_profile(done: Study) -> Profile:
         subjects=len(people),
         calibration=settings.calibration,
         recording=tuple(RecordingRow(file=r.file, sha256=r.sha256, samples=r.rows) for r in done.recordings),
-        emotion=tuple(EmotionRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
+        emotion=tuple(NamedRows(name=name, change=tuple(own)) for name, own in rows.items() if name in EMOTION_CONTROLS),
+        state=tuple(NamedRows(name=name, change=tuple(own)) for name, own in rows.items() if name in STATES),
         unsupported=tuple(refused),
     )

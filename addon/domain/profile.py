@@ -1,7 +1,7 @@
 """An emotion profile: changes of blood that were measured in people, as `sanguine physiology` writes them.
 
 Its rows are those of rigs/blood.toml, with the interval beside the value. A rig that reads a profile takes its rows in
-place of the table's for the same emotion, region and quantity; what the profile does not have stays as it is.
+place of the table's for the same emotion or state, region and quantity; what the profile does not have stays as it is.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 import sanguine_core
 from pydantic import Field
 
-from .blood import ANATOMY, BLOOD_CONTROL_MAX, Quantity, Reference, Rest, Sources
+from .blood import ANATOMY, BLOOD_CONTROL_MAX, STATES, Quantity, Reference, Rest, Sources
 from .errors import InputError, nearest
 from .facs import EMOTION_CONTROLS
 from .files import atomic, read_toml, validate
@@ -69,7 +69,9 @@ class ProfileRow(Row):
     note: str = ""
 
 
-class EmotionRows(Row):
+class NamedRows(Row):
+    """Of one emotion or state."""
+
     name: str
     change: tuple[ProfileRow, ...]
 
@@ -92,13 +94,14 @@ class Profile(Row):
     subjects: Annotated[int, Field(ge=1)]
     calibration: Calibration
     recording: Annotated[tuple[RecordingRow, ...], Field(min_length=1)]
-    emotion: tuple[EmotionRows, ...] = ()
+    emotion: tuple[NamedRows, ...] = ()
+    state: tuple[NamedRows, ...] = ()
     unsupported: tuple[UnsupportedRow, ...] = ()
 
     @property
     def rows(self) -> dict[tuple[str, str, str], ProfileRow]:
-        """(emotion, region, quantity) -> row."""
-        return {(rows.name, row.region, row.quantity): row for rows in self.emotion for row in rows.change}
+        """(emotion or state, region, quantity) -> row."""
+        return {(rows.name, row.region, row.quantity): row for rows in (*self.emotion, *self.state) for row in rows.change}
 
 
 def read_profile(path: str | os.PathLike[str]) -> Profile:
@@ -106,9 +109,12 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
     profile = validate(Profile, read_toml(path), path)
     files = [recording.file for recording in profile.recording]
     seen = set()
-    for rows in profile.emotion:
-        if rows.name not in EMOTION_CONTROLS:
-            raise InputError(f"{path}: emotion: {rows.name}: no such emotion, {nearest(rows.name, EMOTION_CONTROLS)}")
+    for kind, known, rows in (
+        *(("emotion", EMOTION_CONTROLS, rows) for rows in profile.emotion),
+        *(("state", STATES, rows) for rows in profile.state),
+    ):
+        if rows.name not in known:
+            raise InputError(f"{path}: {kind}: {rows.name}: no such {kind}, {nearest(rows.name, known)}")
         for row in rows.change:
             where = f"{path}: {rows.name} {row.region} {row.quantity}"
             if row.region not in ANATOMY:
@@ -260,8 +266,8 @@ def write_profile(path: str | os.PathLike[str], profile: Profile) -> None:
     ]
     for recording in profile.recording:
         lines += ["", "[[recording]]", *(f"{key} = {_toml(value)}" for key, value in recording.model_dump().items())]
-    for rows in profile.emotion:
-        lines += ["", "[[emotion]]", f"name = {_text(rows.name)}", "change = ["]
+    for kind, rows in (*(("emotion", rows) for rows in profile.emotion), *(("state", rows) for rows in profile.state)):
+        lines += ["", f"[[{kind}]]", f"name = {_text(rows.name)}", "change = ["]
         lines += [f"    {_inline(row.model_dump())}," for row in rows.change]
         lines += ["]"]
     if profile.unsupported:

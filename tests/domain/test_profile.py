@@ -10,8 +10,8 @@ from sanguine.domain.errors import InputError
 from sanguine.domain.parameters import default_skin, skin_rows
 from sanguine.domain.profile import (
     Calibration,
-    EmotionRows,
     Measured,
+    NamedRows,
     Profile,
     RecordingRow,
     at_rest,
@@ -30,7 +30,7 @@ def profile(rows, refused=(), file="a.csv"):
         format=1, sanguine="0.1.0", sex="pooled", subjects=12, unsupported=tuple(refused),
         calibration=Calibration(index_region=("nose",)),
         recording=(RecordingRow(file=file, sha256="0" * 64, samples=9),),
-        emotion=tuple(EmotionRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
+        emotion=tuple(NamedRows(name=name, change=tuple(changes)) for name, changes in rows.items()),
     )  # fmt: skip
 
 
@@ -43,6 +43,17 @@ def test_a_profile_comes_back(tmp_path):
     assert written.rows["anger", "cheeks", "hemoglobin"].value == pytest.approx(0.3 * 0.014 * ANATOMY["cheeks"].hemoglobin, rel=1e-3)
     assert {region for emotion, region, quantity in written.rows if emotion == "sad"} == set(ANATOMY)
     assert written.rows["sad", "lips", "oxygenation"].low == -0.015
+
+
+def test_states_have_rows_too(tmp_path, monkeypatch):
+    monkeypatch.setattr("sanguine.domain.profile.STATES", {"exertion": "…"})
+    rows, _ = profile_rows([Measured("exertion", "hemoglobin_index", "nose", 9, 0.2, 0.1, 0.3)], Calibration(), ["a.csv"])
+    written = profile({}).model_copy(update={"state": (NamedRows(name="exertion", change=tuple(rows["exertion"])),)})
+    write_profile(tmp_path / "p.toml", written)
+    assert read_profile(tmp_path / "p.toml") == written and ("exertion", "nose", "hemoglobin") in written.rows
+    monkeypatch.setattr("sanguine.domain.profile.STATES", {"exertions": "…"})
+    with pytest.raises(InputError, match="state: exertion: no such state, did you mean 'exertions'"):
+        read_profile(tmp_path / "p.toml")
 
 
 def test_an_index_becomes_blood_by_its_gain_where_it_was_taken():

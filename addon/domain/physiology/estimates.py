@@ -59,6 +59,48 @@ def subject_changes(found: Iterable[tuple[Track, Sequence[Level]]]) -> tuple[lis
 
 
 @dataclass(frozen=True)
+class Residue:
+    """The share of an emotion's change that the rest after it still holds, with its 95 % interval over subjects."""
+
+    share: float
+    low: float
+    high: float
+
+
+def rest_residue(found: Iterable[tuple[Track, Sequence[Level]]]) -> Residue | None:
+    """Whether rests were long enough: the slope of (rest after - rest before) over the change of the episode between.
+
+    The change of the episode before is a second regressor, since the rest before may hold some of it; a drift of the
+    sensor is in the intercept. What remains is blood that has not come back: the baselines hold half of it, and changes
+    are too small by that. Interval: bootstrap over subjects. None with fewer than MIN_SUBJECTS, or if the episodes do
+    not tell the two apart.
+    """
+    moments: dict[str, np.ndarray] = {}
+    for track, levels in found:
+        previous = 0.0
+        for before, episode, after in zip(levels, levels[1:], levels[2:], strict=False):
+            if before.emotion == after.emotion == NEUTRAL != episode.emotion:
+                x = episode.value - (before.value + after.value) / 2.0
+                row = np.array([1.0, x, previous, after.value - before.value])
+                moments[track.subject] = moments.get(track.subject, 0.0) + np.outer(row, row)
+                previous = x
+    if len(moments) < st.MIN_SUBJECTS:
+        return None
+    each = np.array(list(moments.values()))
+    times = np.random.default_rng(0).multinomial(len(each), np.full(len(each), 1.0 / len(each)), 1000)
+    total = np.concatenate([each.sum(axis=0)[None], np.tensordot(times, each, axes=1)])
+    left, right = total[:, :3, :3], total[:, :3, 3]
+    # On the scale of a correlation matrix, whose condition says whether there is an answer.
+    scale = np.sqrt(np.maximum(np.diagonal(left, axis1=1, axis2=2), 1e-300))
+    scaled = left / (scale[:, :, None] * scale[:, None, :])
+    if np.linalg.cond(scaled).max() > 1e6:
+        return None
+    share = (np.linalg.solve(scaled, (right / scale)[:, :, None])[:, :, 0] / scale)[:, 1]
+    low, high = np.quantile(share[1:], (0.025, 0.975))
+    return Residue(float(share[0]), float(low), float(high))
+
+
+@dataclass(frozen=True)
 class Finding:
     """What the study says about one change, difference or correlation.
 
