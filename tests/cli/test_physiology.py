@@ -4,6 +4,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -65,6 +66,18 @@ def test_report_profile_and_plots(recording, tmp_path):
     assert any(row.measure == "perfusion" and "finger" in row.verdict for row in read.unsupported)
     for name in ("changes.png", "courses.png"):
         assert (plots / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_example_says_what_docs_say():
+    """docs/physiology.md quotes it."""
+    root = Path(__file__).resolve().parents[2]
+    options = physiology.Settings()
+    done = physiology.study(physiology.read_recordings([root / "examples" / "recording.csv"], options), options)
+    row = physiology.make_profile(done).rows["anger", "cheeks", "hemoglobin"]
+    page = (root / "docs" / "physiology.md").read_text(encoding="utf-8")
+    assert f"value = {row.value!r}, low = {row.low!r}, high = {row.high!r}" in page and row.note in page
+    supported = {(f.measure, f.emotion) for f in done.findings if f.supported and f.group == "pooled"}
+    assert {(H, "anger"), (H, "fear"), ("spo2", "sad")} <= supported and not {(H, "happy"), (H, "sad")} & supported
 
 
 def test_json_on_standard_output_alone_and_progress_lines(recording):
