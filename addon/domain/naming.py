@@ -1,6 +1,6 @@
 """Other names for the same face: which of a mesh's shape keys are which ARKit key, action unit or emotion.
 
-A convention is one file in rigs/names/: a row says of which of our names a foreign key is made. Spelling is not part of
+A convention is one file in rigs/names/: a row says of which of our names a foreign key is made. Spelling is no part of
 it: case, separators, sides (`_L`, `.R`, `Left`, `r_`) and prefixes (`blendShape1.`, `head_`) are stripped here, for all.
 """
 
@@ -100,8 +100,8 @@ def _short_row(row: Any) -> Any:
 
 
 def known_targets() -> frozenset[str]:
-    """What a foreign key may be made of: the ARKit keys and our own, action units (`AU12`, `AU12L`: the names of their sliders),
-    emotions."""
+    """What a foreign key may be made of: ARKit's keys and our own, action units (`AU12`, `AU12L`: the names of their
+    sliders), emotions."""
     return frozenset((*KNOWN_KEYS, *UNIT_CONTROLS, *EMOTION_CONTROLS))
 
 
@@ -206,8 +206,8 @@ class Recognised:
 
     @property
     def sources(self) -> dict[str, Shares]:
-        """Mesh key -> shares of ARKit keys, where there are any."""
-        return self._made_of(frozenset(ARKIT.keys))
+        """Mesh key -> shares of shape keys: ARKit's, or our own (rigs/own_keys.toml)."""
+        return self._made_of(frozenset(KNOWN_KEYS))
 
     @property
     def units(self) -> dict[str, Shares]:

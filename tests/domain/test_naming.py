@@ -143,7 +143,8 @@ def test_real_lists_cover_arkit(convention, keys, missing):
     found = recognise(keys)
     assert found.convention == convention and set(found.followed) == {convention} and found.sure > 0.9
     assert set(found.missing) == missing and not found.unknown and not found.spare
-    assert {target for shares in found.sources.values() for target in shares} == set(ARKIT.keys) - missing
+    targets = {target for shares in found.sources.values() for target in shares}
+    assert targets & set(ARKIT.keys) == set(ARKIT.keys) - missing
 
 
 def test_ict_splits_two_keys_into_sides():
@@ -209,6 +210,8 @@ def test_mpfb_units_are_those_of_the_package_with_measured_shares():
         own = ((unit(key) + unit(other)[twin] * flip) / 2)[body].ravel()
         pair = len(row.of) == 2 and len({target.removesuffix("Left").removesuffix("Right") for target in row.of}) == 1
         for target, share in row.of.items():
+            if target not in arkit:
+                continue  # our own keys are made of MakeHuman's targets: mapped by name
             theirs = sum(arkit[name] for name in row.of) if pair else arkit[target]
             projection = theirs[body].ravel() @ own / (own @ own) / (2 if pair else 1)
             most = 0.5 if pair else 1.0
