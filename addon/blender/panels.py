@@ -9,6 +9,7 @@ from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
+from .capture import SANGUINE_OT_import_capture
 from .operators import (
     SANGUINE_OT_apply_skin,
     SANGUINE_OT_draw_person,
@@ -41,6 +42,7 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         for name in (*EMOTION_CONTROLS, BLOOD_CONTROL):
             if name in bone:
                 column.prop(bone, f'["{name}"]', text=name.capitalize(), slider=True)
+        layout.operator(SANGUINE_OT_import_capture.bl_idname, icon="IMPORT")
 
 
 class _FacePanel(_SidebarPanel):

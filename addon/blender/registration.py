@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import operators, panels, properties
+from . import capture, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *capture.CLASSES, *panels.CLASSES)
 _commands: list[object] = []
 
 

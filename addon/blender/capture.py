@@ -1,0 +1,157 @@
+"""Import Capture: a recorded face as an action on the control bone.
+
+What animates the rig already is pushed down into an NLA strip of its own and plays on below, so the take replaces only
+the controls that it holds. The curves are ordinary ones: a file with them plays without the add-on.
+"""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+
+from ..app.capture import Performance, capture
+from ..domain.capture_emotion import SUFFIX
+from ..domain.errors import InputError
+from ..domain.facs import EMOTION_MAX
+from .controls import CONTROL_BONE, add_controls, describe, emotions_of
+from .curves import action_curve, ensure_action, set_keys
+from .operators import active_face, controls_of, emotion_bone
+
+GROUP = "Capture"
+
+
+def import_performance(rig: bpy.types.Object, performance: Performance, start: int = 1) -> bpy.types.Action:
+    """Makes `performance` the action of `rig`, its first frame at `start`. Sliders that the rig lacks are added.
+
+    Raises ValueError where Blender cannot take it, with nothing changed.
+    """
+    if rig.library is not None:
+        raise InputError(f"{rig.name}: linked from another file: make a library override of it first")
+    animation = rig.animation_data or rig.animation_data_create()
+    if animation.use_tweak_mode:
+        raise InputError(f"{rig.name}: an NLA strip is being edited: leave tweak mode first")
+    _add_sliders(rig, performance)
+    _push_down(animation)
+    action = ensure_action(rig, performance.name)
+    for name, (frames, values) in performance.controls.items():
+        curve = action_curve(rig, f'pose.bones["{CONTROL_BONE}"]["{name}"]', group=GROUP)
+        set_keys(curve, frames + start, values)
+    rig.update_tag()
+    return action
+
+
+def _add_sliders(rig: bpy.types.Object, performance: Performance) -> None:
+    """Sides of units, and the blood of inferred emotions without their muscles."""
+    bone = add_controls(rig, emotions_of(rig))
+    for name in performance.controls:
+        if name.endswith(SUFFIX) and name not in bone:
+            bone[name] = 0.0
+            emotion = name.removesuffix(SUFFIX)
+            describe(bone, name, f"The blood of {emotion}, without its muscles", 0.0, EMOTION_MAX, 0.0, 1.0)
+            bone.property_overridable_library_set(f'["{name}"]', True)
+
+
+def _push_down(animation: bpy.types.AnimData) -> None:
+    """The active action into a strip on a track of its own, blended as it was, so that nothing of it is lost."""
+    action = animation.action
+    if action is None:
+        return
+    slot = getattr(animation, "action_slot", None)
+    first, last = action.frame_range
+    track = animation.nla_tracks.new()
+    track.name = action.name
+    strip = track.strips.new(action.name, int(first), action)
+    if slot is not None:
+        strip.action_slot = slot
+    if last > first:  # a strip starts on whole frames, an action need not
+        strip.frame_start, strip.frame_end = first, last
+        strip.action_frame_start, strip.action_frame_end = first, last
+    strip.extrapolation = animation.action_extrapolation
+    strip.blend_type = animation.action_blend_type
+    strip.influence = animation.action_influence
+    animation.action = None
+
+
+class SANGUINE_OT_import_capture(bpy.types.Operator):
+    bl_idname = "sanguine.import_capture"
+    bl_label = "Import Capture"
+    bl_description = (
+        "Make a recorded face (Live Link Face, OpenFace or MediaPipe CSV) the animation of the active face's controls: action "
+        "units, head and eyes, and the blood of the emotions that the face shows. Other animation is pushed down, not replaced"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.csv", options={"HIDDEN"})
+    start: bpy.props.IntProperty(name="Start Frame", description="Where the take begins", default=1)
+    smooth: bpy.props.FloatProperty(
+        name="Smoothing", description="Window in seconds; 0.1 takes a tracker's noise. There is no delay", min=0.0, max=2.0,
+        soft_max=0.5, default=0.0, step=1, precision=2,
+    )
+    reduce: bpy.props.FloatProperty(
+        name="Fewer Keys", description="Leave out keys as long as no value is off by more than this; 0 keys every frame",
+        min=0.0, max=0.5, soft_max=0.05, default=0.0, step=0.1, precision=3,
+    )
+    emotions: bpy.props.BoolProperty(
+        name="Infer Emotions", description="Let the blood of the rig's emotions follow what the face shows", default=True
+    )
+    head: bpy.props.BoolProperty(name="Head", description="Turn the head too, by units 51 to 56", default=True)
+    source_fps: bpy.props.FloatProperty(
+        name="Recorded at", description="Frames per second of a recording that does not tell the time; 0 finds out", min=0.0,
+        max=1000.0, default=0.0,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        face = active_face(context)
+        if context.mode not in {"OBJECT", "POSE"}:
+            cls.poll_message_set("Leave to object or pose mode first")
+        elif face is None:
+            cls.poll_message_set("Select a face: a mesh object, or its armature")
+        elif emotion_bone(face) is None:
+            cls.poll_message_set("The face has no controls yet: apply the skin first")
+        elif controls_of(face).library is not None:
+            cls.poll_message_set("The rig is linked: override its library first")
+        elif (animation := controls_of(face).animation_data) is not None and animation.use_tweak_mode:
+            cls.poll_message_set("Leave the NLA's tweak mode first")
+        else:
+            return True
+        return False
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        self.start = context.scene.frame_current
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        rig = controls_of(active_face(context))
+        render = context.scene.render
+        began = time.perf_counter()
+        try:
+            performance = capture(
+                bpy.path.abspath(self.filepath),
+                fps=render.fps / render.fps_base,
+                smooth_s=self.smooth,
+                emotions=emotions_of(rig) if self.emotions else (),
+                source_fps=self.source_fps or None,
+                reduce=self.reduce,
+                head=self.head,
+            )
+            import_performance(rig, performance, self.start)
+        except (ValueError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in performance.notes:
+            self.report({"INFO"}, note)
+        felt = ", ".join(f"{name} {level:.2f}" for name, level in performance.emotions().items())
+        self.report(
+            {"INFO"},
+            f"{performance.name}: {performance.seconds:.1f} s at {performance.source_fps:g} frames a second on frames {self.start} "
+            f"to {self.start + performance.frames - 1}, {len(performance.controls)} controls, in {time.perf_counter() - began:.1f} s"
+            + (f"; the blood follows {felt}" if felt else ""),
+        )
+        return {"FINISHED"}
+
+
+CLASSES = (SANGUINE_OT_import_capture,)
