@@ -1,4 +1,4 @@
-"""The plots of a study: boxes per emotion and sex, and courses around the onset of a label. Needs matplotlib, imported where it is used."""
+"""The plots of a study: boxes per emotion and sex, courses around the onset of a label, correlations. Needs matplotlib, imported where it is used."""
 
 from __future__ import annotations
 
@@ -21,9 +21,11 @@ _LEAST_SUBJECTS = 3
 
 
 def write_plots(done: Study, folder: str | os.PathLike[str]) -> list[str]:
-    """Writes changes.png and courses.png. Returns their names."""
+    """Writes changes.png, courses.png and correlations.png. Returns their names."""
     written = []
-    for name, figure in (("changes.png", _changes(done)), ("courses.png", _courses(done))):
+    figures = {"changes.png": _changes, "courses.png": _courses, "correlations.png": _correlations}
+    for name, draw in figures.items():
+        figure = draw(done)
         with atomic(Path(folder) / name) as temporary:
             figure.savefig(temporary, dpi=150, metadata={"Software": None})
         written.append(name)
@@ -79,7 +81,7 @@ def _changes(done: Study) -> Any:
     series, emotions, sexes = _series(done), _emotions(done), _sexes(done)
     columns = {1: 1, 2: 2, 4: 2}.get(len(series), 3)
     rows = -(-len(series) // columns)
-    figure, axes = _figure(rows, columns, max(3.4, 1.1 + 0.95 * len(emotions)) * columns, 2.9 * rows + 0.4)
+    figure, axes = _figure(rows, columns, max(max(3.4, 1.1 + 0.95 * len(emotions)) * columns, 5.0), 2.9 * rows + 0.4)
     width = 0.7 / (len(sexes) + 1)
     for key, ax in zip(series, axes.flat, strict=False):
         own = [change for change in done.changes if (change.measure, change.region) == key]
@@ -122,12 +124,18 @@ def _legend(figure: Any, sexes: list[str], marks: list[tuple[str, str, str]]) ->
 
     handles = [Patch(facecolor=COLOURS[sex], alpha=0.4, edgecolor=COLOURS[sex], label=sex or "sex not stated") for sex in sexes]
     handles += [Line2D([], [], marker=m, color="k", mfc=face, mec="k", ms=4.5, lw=1.4, label=text) for m, face, text in marks]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8, frameon=False)
+    _legend_above(figure, handles)
+
+
+def _legend_above(figure: Any, handles: list[Any]) -> None:
+    """As many columns as the figure is wide enough for."""
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / 2.3)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, fontsize=8, frameon=False)
 
 
 def _courses(done: Study) -> Any:
     series, emotions, sexes = _series(done), _emotions(done), _sexes(done)
-    figure, axes = _figure(len(series), len(emotions), 2.5 * len(emotions) + 0.9, 1.9 * len(series) + 0.5)
+    figure, axes = _figure(len(series), len(emotions), max(2.5 * len(emotions) + 0.9, 5.0), 1.9 * len(series) + 0.5)
     step = done.settings.settling.window_s
     edges = np.arange(-_BEFORE_S, _AFTER_S + step, step)
     middle = (edges[1:] + edges[:-1]) / 2.0
@@ -165,9 +173,10 @@ def _courses(done: Study) -> Any:
     handles += [
         Patch(facecolor="0.5", alpha=0.25, label="95 % interval of the mean"),
         Patch(facecolor="0.94", label="the label lasts"),
-        Line2D([], [], color="0.4", ls=":", lw=0.8, label="lag of the sensor"),
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
+    if any(done.used_lag_s.get(measure) for measure, _ in series):
+        handles.append(Line2D([], [], color="0.4", ls=":", lw=0.8, label="lag of the sensor"))
+    _legend_above(figure, handles)
     return figure
 
 
@@ -212,3 +221,58 @@ def _course(done: Study, key: tuple[str, str], edges: np.ndarray) -> list[tuple[
         mean = np.where(there > 0, np.nansum(stacked, axis=0) / np.maximum(there, 1), np.nan)
         out.append((emotion, sex, mean, float(np.mean([lasts for _, lasts in episodes]))))
     return out
+
+
+def _correlations(done: Study) -> Any:
+    """Each measure with each label, and each two measures, within people."""
+    series, emotions = _series(done), _emotions(done)
+    several = len(series) > 1
+    width = 1.05 * (len(emotions) + several * (len(series) - 1)) + 3.0 + 1.2 * several
+    figure, axes = _figure(1, 1 + several, width, 0.62 * len(series) + 1.6)
+    names = [MEASURES[measure].name + (f",\n{region}" if region else "") for measure, region in series]
+    found = {(f.measure, f.region, f.emotion): f for f in done.findings if f.group == POOLED}
+    image = _matrix(
+        axes[0, 0], [[_cell(found.get((*key, emotion))) for emotion in emotions] for key in series], names, emotions,
+        "with the label",
+    )  # fmt: skip
+    if several:
+        pairs = {}
+        for pair in done.pairs:
+            keys = [(m, pair.region if MEASURES[m].device == "analyser" else "") for m in pair.measures]
+            pairs[frozenset(keys)] = pair
+        between = [
+            [_cell(pairs.get(frozenset((a, b)))) if j <= i else None for j, b in enumerate(series[:-1])]
+            for i, a in enumerate(series[1:])
+        ]
+        _matrix(axes[0, 1], between, names[1:], names[:-1], "with each other")
+    bar = figure.colorbar(image, ax=axes[0, -1], shrink=0.8)
+    bar.set_label("correlation within people", fontsize=8)
+    bar.ax.tick_params(labelsize=8)
+    return figure
+
+
+def _cell(finding: Any) -> tuple[float, float, float, bool] | None:
+    """(r, low, high, supported)"""
+    if finding is None or finding.correlation is None:
+        return None
+    r = finding.correlation
+    return r.value, r.low, r.high, finding.verdict == "supported"
+
+
+def _matrix(ax: Any, cells: list[list[Any]], rows: list[str], columns: list[str], title: str) -> Any:
+    values = np.array([[np.nan if cell is None else cell[0] for cell in row] for row in cells])
+    image = ax.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
+    for i, row in enumerate(cells):
+        for j, cell in enumerate(row):
+            if cell is not None:
+                value, low, high, supported = cell
+                colour = "w" if abs(value) > 0.65 else "k"
+                ax.text(j, i - 0.12, f"{value:+.2f}", ha="center", va="center", fontsize=8, color=colour,
+                        weight="bold" if supported else "normal")  # fmt: skip
+                ax.text(j, i + 0.22, f"{low:+.2f} to {high:+.2f}", ha="center", va="center", fontsize=6.2, color=colour)
+    ax.set_xticks(range(len(columns)), columns, fontsize=7)
+    ax.set_yticks(range(len(rows)), rows, fontsize=7)
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
+    ax.set_title(title + " (bold: supported)", fontsize=9)
+    return image

@@ -128,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
                        "blood of emotions")
     physiology.add_argument("recordings", metavar="RECORDING.csv", nargs="+",
                             help="columns time_s, subject, sex, emotion, spo2_percent, pulse_bpm, … (docs/physiology.md)")
-    physiology.add_argument("--plots", metavar="DIR", help="folder for changes.png and courses.png")
+    physiology.add_argument("--plots", metavar="DIR", help="folder for changes.png, courses.png and correlations.png")
     physiology.add_argument("--profile", metavar="PROFILE.toml", help="write the supported changes for a rig")
     physiology.add_argument("--sex", default="pooled", choices=("pooled", "female", "male"),
                             help="whose changes the profile holds (default %(default)s)")

@@ -64,7 +64,7 @@ def test_report_profile_and_plots(recording, tmp_path):
     )
     assert ("fear", "cheeks", "oxygenation") in read.rows and ("fear", "cheeks", "hemoglobin") not in read.rows
     assert any(row.measure == "perfusion" and "finger" in row.verdict for row in read.unsupported)
-    for name in ("changes.png", "courses.png"):
+    for name in ("changes.png", "courses.png", "correlations.png"):
         assert (plots / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
@@ -106,7 +106,7 @@ def test_the_same_input_gives_the_same_bytes(recording, tmp_path):
     for name in ("1", "2"):
         assert run(recording, "--out", tmp_path / name, "--plots", tmp_path / f"plots{name}").returncode == 0
     assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
-    for name in ("changes.png", "courses.png"):
+    for name in ("changes.png", "courses.png", "correlations.png"):
         assert (tmp_path / "plots1" / name).read_bytes() == (tmp_path / "plots2" / name).read_bytes()
 
 
