@@ -14,7 +14,16 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..domain.blood import BLOOD_CONTROL, BLOOD_CONTROL_MAX, STATES
+from ..domain.blood import (
+    BLOOD_CONTROL,
+    BLOOD_CONTROL_MAX,
+    HEART_RATE_CONTROL,
+    MOOD_SUFFIX,
+    PRESSURE_CONTROL,
+    PULSE_CONTROL,
+    STATES,
+    StateRow,
+)
 from ..domain.errors import InputError, nearest
 from ..domain.facs import (
     ACTION_UNITS,
@@ -31,6 +40,7 @@ from ..domain.facs import (
 )
 from ..domain.naming import mesh_responses, recognise
 from ..domain.response import MAX_EXPRESSION, Formula, Sum, driver_text
+from ..domain.vascular import HEART_RATE, HEART_RATE_AT_REST
 from .curves import curves
 
 CONTROL_BONE = "sanguine"
@@ -48,13 +58,30 @@ class Control:
     default: float = 0.0
     maximum: float = 1.0
     soft_maximum: float = 1.0
+    minimum: float = 0.0
 
 
 _VARIANTS_HELP = ", ".join(f"{value:g} {name}" for name, value in VARIANTS.items())
 
+OPTIONAL: dict[str, StateRow] = {
+    PULSE_CONTROL: StateRow(label="Heartbeat", help="How strongly the heartbeat shows in baked blood: 1 as in life"),
+    PRESSURE_CONTROL: StateRow(label="Pressure", help="How hard it presses where the face's pressure group says so"),
+}
+"""What is asked for as states are, though no blood of rigs/blood.toml follows it."""
+
 CONTROLS: dict[str, Control] = {
     **{name: Control(f"{EMOTIONS[name].help}. {_VARIANTS_HELP}", maximum=EMOTION_MAX) for name in EMOTION_CONTROLS},
-    **{name: Control(help) for name, help in STATES.items()},
+    **{name: Control(row.help) for name, row in STATES.items()},
+    **{name: Control(row.help) for name, row in OPTIONAL.items()},
+    HEART_RATE_CONTROL: Control(
+        "Heartbeats per minute", HEART_RATE_AT_REST, HEART_RATE[1], HEART_RATE[1], minimum=HEART_RATE[0]
+    ),
+    **{
+        name + MOOD_SUFFIX: Control(
+            f"The blood of {name} without its muscles, for a captured performance. {_VARIANTS_HELP}", maximum=EMOTION_MAX
+        )
+        for name in EMOTION_CONTROLS
+    },
     BLOOD_CONTROL: Control(
         "How strongly blood answers: 0 not at all, 1 as in life, above 1 exaggerated",
         1.0,
@@ -64,6 +91,9 @@ CONTROLS: dict[str, Control] = {
     **{name: Control(help) for name, help in UNIT_CONTROLS.items()},
 }
 """Every slider that a rig can have, in the order in which they are added."""
+
+ON_DEMAND: tuple[str, ...] = (*EMOTION_CONTROLS, *STATES, *OPTIONAL, *(name + MOOD_SUFFIX for name in EMOTION_CONTROLS))
+"""Those that a rig has only if it was asked for them."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +126,10 @@ def add_controls(
     """
     asked = {name for name in emotions if name != "neutral"} | set(states)
     for name in asked:
-        if name not in EMOTION_CONTROLS and name not in STATES:
-            raise InputError(f"{name}: no such emotion or state, {nearest(name, (*EMOTION_CONTROLS, *STATES))}")
+        if name not in ON_DEMAND:
+            raise InputError(f"{name}: no such emotion or state, {nearest(name, ON_DEMAND)}")
+    if PULSE_CONTROL in asked:
+        asked.add(HEART_RATE_CONTROL)
     if CONTROL_BONE not in armature.data.bones:
         with _edit_bones(armature) as bones:
             bone = bones.new(CONTROL_BONE)
@@ -109,10 +141,10 @@ def add_controls(
     halves = {f"AU{side}" for unit in ACTION_UNITS.values() if unit.sided and not unit.one_sided for side in unit.sides}
     for name, control in CONTROLS.items():
         if name not in bone:
-            if (name in EMOTION_CONTROLS or name in STATES) and name not in asked or name in halves and not sides:
+            if name in (*ON_DEMAND, HEART_RATE_CONTROL) and name not in asked or name in halves and not sides:
                 continue
             bone[name] = control.default
-        describe(bone, name, control.help, 0.0, control.maximum, control.default, control.soft_maximum)
+        describe(bone, name, control.help, control.minimum, control.maximum, control.default, control.soft_maximum)
         bone.property_overridable_library_set(f'["{name}"]', True)
     # A driver that is evaluated before the armature's evaluated copy has this pose is marked invalid for good.
     armature.update_tag()
@@ -125,9 +157,12 @@ def remove_emotion(armature: bpy.types.Object, name: str) -> None:
     """Takes one emotion or state off the rig. What else listens to it (blood) has to be driven anew; its animation
     stays in its action and plays again when the emotion is put back."""
     bone = armature.pose.bones[CONTROL_BONE]
-    if name not in (*emotions_of(armature), *states_of(armature)):
-        raise InputError(f"{name}: not on this rig, {nearest(name, (*emotions_of(armature), *states_of(armature)))}")
+    present = _on(armature, ON_DEMAND)
+    if name not in present:
+        raise InputError(f"{name}: not on this rig, {nearest(name, present)}")
     del bone[name]
+    if name == PULSE_CONTROL:
+        del bone[HEART_RATE_CONTROL]
     _drive_units(armature)
 
 
@@ -138,7 +173,7 @@ def emotions_of(armature: bpy.types.Object) -> tuple[str, ...]:
 
 def states_of(armature: bpy.types.Object) -> tuple[str, ...]:
     """The states of the body that are on a rig."""
-    return _on(armature, STATES)
+    return _on(armature, (*STATES, *OPTIONAL))
 
 
 def _on(armature: bpy.types.Object, names: Iterable[str]) -> tuple[str, ...]:
@@ -168,8 +203,9 @@ def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> Non
             if value == 0.0:
                 continue
             raise InputError(f"{name}: not on this rig, which has {', '.join(emotions_of(armature) + states_of(armature))}")
-        if not 0.0 <= value <= CONTROLS[name].maximum:
-            raise InputError(f"{name}: {value} is outside 0 to {CONTROLS[name].maximum:g}")
+        low, high = CONTROLS[name].minimum, CONTROLS[name].maximum
+        if not low <= value <= high:
+            raise InputError(f"{name}: {value} is outside {low:g} to {high:g}")
         bone[name] = float(value)
     armature.update_tag()  # writing a custom property from Python does not by itself re-evaluate drivers
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import bpy
 
 from ..domain.effects import Frame, Scene
-from ..domain.facs import EMOTION_CONTROLS
+from ..domain.blood import PRESSURE_CONTROL
+from ..domain.facs import DEFAULT_EMOTIONS
 from ..domain.people import SEXES, TONES, person
 from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
+from ..domain.vascular import reach
+from .blood import blood_sliders
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .material import MARK
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
@@ -30,12 +33,19 @@ def controls_of(face: bpy.types.Object) -> bpy.types.Object | None:
     return next((rig for rig in rigs if rig is not None and rig.type == "ARMATURE"), None)
 
 
+def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
+    rig = controls_of(face)
+    return rig.pose.bones.get(CONTROL_BONE) if rig is not None and rig.pose is not None else None
+
+
 def live_plan(face: bpy.types.Object) -> Plan:
-    """The plan while an artist works: every emotion may still be pulled, every skin slider moved."""
+    """The plan while an artist works: every emotion on the rig may still be pulled, every skin slider moved."""
+    bone = emotion_bone(face)
+    sliders = blood_sliders(bone.id_data) if bone is not None else DEFAULT_EMOTIONS
     return make_plan(
         Scene(
             skin=skin_of(face),
-            frames=(Frame("live", dict.fromkeys(EMOTION_CONTROLS, 1.0)),),
+            frames=(Frame("live", dict.fromkeys(sliders, 1.0), changes=reach(sliders)),),
             strengths=strengths_of(face),
             regions=face_regions(face),
             live=True,
@@ -43,12 +53,13 @@ def live_plan(face: bpy.types.Object) -> Plan:
             growth=growth_of(face),
             shape_keys=has_shape_keys(face),
             pressure=has_pressure(face),
+            presses=bone is not None and PRESSURE_CONTROL in bone,
         ),
         quality_of(face),
     )
 
 
-def _may_change(cls: type[bpy.types.Operator], face: bpy.types.Object | None) -> bool:
+def may_change(cls: type[bpy.types.Operator], face: bpy.types.Object | None) -> bool:
     if face is None:
         cls.poll_message_set("Select a face: a mesh object")
     elif face.library or face.data.library:
@@ -69,7 +80,7 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave to object mode first")
             return False
-        return _may_change(cls, active_face(context))
+        return may_change(cls, active_face(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
@@ -137,7 +148,7 @@ class SANGUINE_OT_read_picture(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _may_change(cls, active_face(context))
+        return may_change(cls, active_face(context))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.image and (image := albedo_of(active_face(context))) is not None:
@@ -185,7 +196,7 @@ class SANGUINE_OT_draw_person(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _may_change(cls, active_face(context))
+        return may_change(cls, active_face(context))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_props_dialog(self)
@@ -210,11 +221,6 @@ def _new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Ob
     context.view_layer.update()
     face.matrix_world = world
     return rig
-
-
-def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
-    rig = controls_of(face)
-    return rig.pose.bones.get(CONTROL_BONE) if rig is not None and rig.pose is not None else None
 
 
 CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, SANGUINE_OT_draw_person)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ..domain.blood import BLOOD_CONTROL
+from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, MOOD_SUFFIX, STATES
 from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
-from ..domain.facs import EMOTION_CONTROLS
+from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
+from .animation import (
+    SANGUINE_OT_add_feeling,
+    SANGUINE_OT_add_poses,
+    SANGUINE_OT_bake_blood,
+    SANGUINE_OT_clear_blood,
+    SANGUINE_OT_remove_feeling,
+    rig_of,
+)
+from .bake import bake_state
 from .capture import SANGUINE_OT_import_capture
+from .controls import CONTROL_BONE, OPTIONAL
 from .operators import (
     SANGUINE_OT_apply_skin,
     SANGUINE_OT_draw_person,
@@ -38,11 +48,22 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         bone = emotion_bone(face) if face else None
         if bone is None:
             return
-        column = layout.column(align=True)
-        for name in (*EMOTION_CONTROLS, BLOOD_CONTROL):
-            if name in bone:
-                column.prop(bone, f'["{name}"]', text=name.capitalize(), slider=True)
+        for names in (EMOTION_CONTROLS, [*STATES, *OPTIONAL, HEART_RATE_CONTROL], [BLOOD_CONTROL]):
+            column = layout.column(align=True)
+            for name in names:
+                if name in bone:
+                    column.prop(bone, f'["{name}"]', text=_slider_label(bone, name), slider=True)
+        row = layout.row(align=True)
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(SANGUINE_OT_add_feeling.bl_idname, text="Add", icon="ADD")
+        row.operator(SANGUINE_OT_remove_feeling.bl_idname, text="Remove", icon="REMOVE")
         layout.operator(SANGUINE_OT_import_capture.bl_idname, icon="IMPORT")
+
+
+def _slider_label(bone: bpy.types.PoseBone, name: str) -> str:
+    if name == BLOOD_CONTROL and bone[name] > 1.0:
+        return "Blood (exaggerated)"
+    return STATES[name].label if name in STATES else name.replace("_", " ").capitalize()
 
 
 class _FacePanel(_SidebarPanel):
@@ -52,6 +73,51 @@ class _FacePanel(_SidebarPanel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return active_face(context) is not None
+
+
+class SANGUINE_PT_time(_FacePanel, bpy.types.Panel):
+    bl_label = "Blood in Time"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return rig_of(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, rig = self.layout, rig_of(context)
+        state = bake_state(active_face(context), rig, context.scene)
+        if not state.baked:
+            layout.label(text="Settled: the answer that blood comes to", icon="INFO")
+        elif state.stale:
+            layout.label(text="Stale: bake again", icon="ERROR")
+            layout.label(text=state.stale)
+        else:
+            layout.label(text="Baked", icon="CHECKMARK")
+        layout.operator(SANGUINE_OT_bake_blood.bl_idname, icon="FCURVE")
+        layout.operator(SANGUINE_OT_clear_blood.bl_idname, icon="X")
+        layout.operator(SANGUINE_OT_add_poses.bl_idname, icon="ASSET_MANAGER")
+        bone = rig.pose.bones[CONTROL_BONE]
+        moods = [name + MOOD_SUFFIX for name in EMOTION_CONTROLS if name + MOOD_SUFFIX in bone]
+        column = layout.column(align=True)
+        for name in moods:
+            column.prop(bone, f'["{name}"]', text=_slider_label(bone, name), slider=True)
+
+
+class SANGUINE_PT_units(_FacePanel, bpy.types.Panel):
+    bl_label = "Action Units"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return rig_of(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        bone = rig_of(context).pose.bones[CONTROL_BONE]
+        column = self.layout.column(align=True)
+        for unit in ACTION_UNITS.values():
+            row = column.row(align=True)
+            for control in (unit.control, f"{unit.control}R", f"{unit.control}L"):
+                if control in bone:
+                    text = f"{unit.id} {unit.name}" if control == unit.control else control[-1]
+                    row.prop(bone, f'["{control}"]', text=text, slider=True)
 
 
 class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
@@ -112,4 +178,12 @@ class SANGUINE_PT_plan(_FacePanel, bpy.types.Panel):
         self.layout.label(text=f"{plan.entries} skins in the table")
 
 
-CLASSES = (SANGUINE_PT_main, SANGUINE_PT_skin, SANGUINE_PT_features, SANGUINE_PT_picture, SANGUINE_PT_plan)
+CLASSES = (
+    SANGUINE_PT_main,
+    SANGUINE_PT_time,
+    SANGUINE_PT_units,
+    SANGUINE_PT_skin,
+    SANGUINE_PT_features,
+    SANGUINE_PT_picture,
+    SANGUINE_PT_plan,
+)

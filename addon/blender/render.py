@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import re
 import sys
@@ -14,13 +15,15 @@ from pathlib import Path
 import bpy
 
 from ..app.skin_maps import Tiles
-from ..domain.blood import BLOOD_CONTROL
+from ..domain.blood import blood_property
 from ..domain.errors import InputError, nearest
 from ..domain.effects.regions import FACE_REGIONS
 from ..domain.plan import Plan
-from ..domain.shot import Image, Pose, Shot, Subject
-from .controls import CONTROLS, set_controls
-from .face import add_face
+from ..domain.shot import Image, Performance, Pose, Shot, Subject, Timeline, feelings_of, performance, pose_at
+from .bake import write_blood
+from .controls import CONTROL_BONE, CONTROLS, set_controls
+from .curves import action_curve, ensure_action, set_keys
+from .face import Face, add_face
 from .skin import apply_skin
 from .stage import LIGHTS, set_stage
 
@@ -29,6 +32,8 @@ class BlenderRenderer:
     """Implements `app.batch.Renderer`."""
 
     _rig: bpy.types.Object
+    # Whether the scene is animated, or posed anew for each picture.
+    _plays: bool
 
     def regions(self, subject: Subject) -> tuple[str, ...]:
         return FACE_REGIONS
@@ -38,7 +43,7 @@ class BlenderRenderer:
             # Not the factory's preferences: inside Blender they would switch off the add-on that is running.
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             scene = bpy.context.scene
-            face = add_face(subject.rig.head)
+            face = add_face(subject.rig.head, *feelings_of(shot))
             set_stage(
                 scene,
                 **face.stage_landmarks,
@@ -49,18 +54,40 @@ class BlenderRenderer:
             )
             set_image(scene, shot.image, plan.settings.samples)
             apply_skin(face.skin, face.rig, plan, given=images)
-        self._rig = face.rig
+            played = performance(shot)
+            if played is not None:
+                scene.frame_start, scene.frame_end = shot.timeline.first, shot.timeline.last
+                scene.render.fps, scene.render.fps_base = _rate(shot.timeline.fps)
+                _play(face, shot.timeline, played)
+        self._rig, self._plays = face.rig, played is not None
 
     def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:
         scene = bpy.context.scene
-        scene.frame_set(frame)
-        values = dict.fromkeys(CONTROLS, 0.0)
-        values |= pose.emotions | pose.action_units | {BLOOD_CONTROL: pose.blood}
-        set_controls(self._rig, values)
+        if self._plays:
+            scene.frame_set(frame)
+        else:
+            bone = self._rig.pose.bones[CONTROL_BONE]
+            set_controls(self._rig, {name: pose.controls.get(name, 0.0) for name in CONTROLS if name in bone})
         with quiet():
             bpy.ops.render.render()
             save_render(scene, png, "PNG")
             save_render(scene, exr, "OPEN_EXR")
+
+
+def _play(face: Face, timeline: Timeline, played: Performance) -> None:
+    """Keys the sliders as the timeline does and the blood frame by frame: the scene then plays, and renders, by itself."""
+    ensure_action(face.rig, "timeline")
+    keys = {key.frame: pose_at(timeline, key.frame).controls for key in timeline.sorted_keys}
+    for name in (name for name in played.controls if name in CONTROLS):
+        curve = action_curve(face.rig, f'pose.bones["{CONTROL_BONE}"]["{name}"]', group="Sanguine")
+        set_keys(curve, list(keys), [controls.get(name, 0.0) for controls in keys.values()])
+    write_blood(face.skin, played.frames, {blood_property(q, region): c for (region, q), c in played.changes.items()})
+
+
+def _rate(fps: float) -> tuple[int, float]:
+    """Blender's frame rate: a whole number over a base."""
+    whole = max(1, math.ceil(fps))
+    return whole, whole / fps
 
 
 def set_image(scene: bpy.types.Scene, image: Image, samples: int) -> None:

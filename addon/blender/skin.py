@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 import bpy
 
 from ..app.maps import Surface, bake_maps, reached, strain_coefficients, wrinkle_coefficients
-from ..domain.blood import BLOOD_CHANNELS
 from ..domain.effects import strain, wrinkles
 from ..domain.errors import InputError
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
-from .blood import drive_blood
+from .bake import clear_bake
+from .blood import drive_settled, remove_blood
 from .material import MARK, Map, build_skin_material, remove_skin_material
 from .properties import images_of
 from .strain import drive_components, remove_components
@@ -46,8 +46,10 @@ def apply_skin(
         face.material_slots[slot].material = material  # the slot knows whether it belongs to the object or the mesh
     else:
         face.data.materials.append(material)
+    clear_bake(face)
+    remove_blood(face)
     if armature is not None:
-        drive_blood(armature, face, [c for c in BLOOD_CHANNELS.values() if c.property_name in inputs])
+        drive_settled(armature, face, inputs)
     remove_components(face)
     if set(strain.IMAGES) & set(maps):
         drive_components(face, strain.IMAGES, surface.keys.names, strain_coefficients(surface), one_sided=False)

@@ -206,6 +206,9 @@ UNIT_TABLE: UnitTable = read_action_units(rigs_path("action_units.toml"), KNOWN_
 ACTION_UNITS: dict[str, ActionUnit] = {unit.id: unit for unit in UNIT_TABLE.unit}
 EMOTIONS: dict[str, Emotion] = read_emotions(rigs_path("emotions.toml"), ACTION_UNITS)
 
+EMOTION_MAX = 1.5
+"""How far the slider of an emotion goes."""
+
 EMOTION_CONTROLS: tuple[str, ...] = tuple(name for name, emotion in EMOTIONS.items() if emotion.units)
 """Emotions with a slider; neutral is all of them at 0."""
 

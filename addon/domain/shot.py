@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import bisect
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 import pydantic
 
 from . import people
+from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, PULSE_CONTROL, STATES, Blood, Change
 from .effects import Frame, Growth, Scene
 from .effects.effect import Interval
 from .errors import InputError, nearest
-from .facs import EMOTIONS, UNIT_CONTROLS
+from .facs import EMOTION_MAX, EMOTIONS, UNIT_CONTROLS, VARIANTS
 from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
@@ -22,11 +27,24 @@ from .plan import check_strengths
 from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
 from .udim import find_tiles
+from .vascular import HEART_RATE, HEART_RATE_AT_REST, Controls, blood_over_time
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _MAX_IMAGES = 100_000  # per shot; a study of thousands fits, a typing error in a frame range does not
 
 Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+
+
+def _level(value: Any) -> Any:
+    """How far an emotion goes: a number, or the name of a variant."""
+    if isinstance(value, str):
+        if value not in VARIANTS:
+            raise ValueError(f"no such variant '{value}', {nearest(value, VARIANTS)}; or give a number, 0 to {EMOTION_MAX:g}")
+        return VARIANTS[value]
+    return value
+
+
+Level = Annotated[float, pydantic.Field(ge=0.0, le=EMOTION_MAX, allow_inf_nan=False), pydantic.BeforeValidator(_level)]
 
 
 class _Table(pydantic.BaseModel):
@@ -103,11 +121,14 @@ class Subject(_Table):
 
 
 class Pose(_Table):
-    """Emotions and action units, each 0-1, and the strength of the blood's answer."""
+    """Emotions, action units and states of the body, the strength of the blood's answer (above 1: exaggerated), the heart."""
 
-    emotions: dict[str, Fraction] = {}
+    emotions: dict[str, Level] = {}
     action_units: dict[str, Fraction] = {}
-    blood: Annotated[float, pydantic.Field(ge=0.0, le=2.0, allow_inf_nan=False)] = 1.0
+    states: dict[str, Fraction] = {}
+    blood: Annotated[float, pydantic.Field(ge=0.0, le=BLOOD_CONTROL_MAX, allow_inf_nan=False)] = 1.0
+    pulse: Fraction = 0.0
+    heart_rate: Annotated[float, pydantic.Field(ge=HEART_RATE[0], le=HEART_RATE[1])] = HEART_RATE_AT_REST
 
     @pydantic.field_validator("emotions")
     @classmethod
@@ -125,6 +146,27 @@ class Pose(_Table):
                 raise ValueError(f"no such action unit '{name}', {nearest(name, UNIT_CONTROLS)}")
         return value
 
+    @pydantic.field_validator("states")
+    @classmethod
+    def _states(cls, value: dict[str, float]) -> dict[str, float]:
+        for name in value:
+            if name not in STATES:
+                raise ValueError(f"no such state of the body '{name}', {nearest(name, STATES)}")
+        return value
+
+    @property
+    def feelings(self) -> dict[str, float]:
+        """Emotions and states, what moves blood."""
+        return {**self.emotions, **self.states}
+
+    @property
+    def controls(self) -> dict[str, float]:
+        """Slider -> value, of those that the pose names and those that every face has."""
+        return {
+            **self.feelings, **self.action_units,
+            BLOOD_CONTROL: self.blood, PULSE_CONTROL: self.pulse, HEART_RATE_CONTROL: self.heart_rate,
+        }
+
 
 class Expression(Pose):
     """A still: one image per subject."""
@@ -139,12 +181,17 @@ class Key(Pose):
 
 
 class Timeline(_Table):
-    """Keyed poses; frames first to last by step are rendered."""
+    """Keyed poses; frames first to last by step are rendered. Blood takes its time, `fps` frames a second."""
 
+    fps: Annotated[float, pydantic.Field(ge=1.0, le=1000.0)] = 24.0
     first: Annotated[int, pydantic.Field(ge=0, le=1_048_574)] = 1
     last: Annotated[int, pydantic.Field(ge=0, le=1_048_574)]
     step: Annotated[int, pydantic.Field(ge=1)] = 1
     key: Annotated[list[Key], pydantic.Field(min_length=1)]
+
+    @cached_property
+    def sorted_keys(self) -> list[Key]:
+        return sorted(self.key, key=lambda key: key.frame)
 
 
 class Light(_Table):
@@ -301,21 +348,73 @@ def pose_of(shot: Shot, job: Job) -> Pose:
     """The pose of a job; between keys of a timeline it is linear, outside them it holds."""
     if shot.timeline is None:
         return next(item for item in shot.expression if item.id == job.expression)
-    keys = sorted(shot.timeline.key, key=lambda key: key.frame)
-    before = max((k for k in keys if k.frame <= job.frame), key=lambda k: k.frame, default=keys[0])
-    after = min((k for k in keys if k.frame >= job.frame), key=lambda k: k.frame, default=keys[-1])
-    if before.frame >= after.frame:
+    return pose_at(shot.timeline, job.frame)
+
+
+def pose_at(timeline: Timeline, frame: int) -> Pose:
+    keys = timeline.sorted_keys
+    i = bisect.bisect_right(keys, frame, key=lambda key: key.frame)
+    before, after = keys[max(i - 1, 0)], keys[min(i, len(keys) - 1)]
+    if frame <= before.frame or before.frame >= after.frame:
         return before
-    t = (job.frame - before.frame) / (after.frame - before.frame)
+    t = (frame - before.frame) / (after.frame - before.frame)
+
+    def mix(a: float, b: float) -> float:
+        return (1 - t) * a + t * b
 
     def blend(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
-        return {name: (1 - t) * a.get(name, 0.0) + t * b.get(name, 0.0) for name in {**a, **b}}
+        return {name: mix(a.get(name, 0.0), b.get(name, 0.0)) for name in {**a, **b}}
 
     return Pose(
         emotions=blend(before.emotions, after.emotions),
         action_units=blend(before.action_units, after.action_units),
-        blood=(1 - t) * before.blood + t * after.blood,
+        states=blend(before.states, after.states),
+        blood=mix(before.blood, after.blood),
+        pulse=mix(before.pulse, after.pulse),
+        heart_rate=mix(before.heart_rate, after.heart_rate),
     )
+
+
+@dataclass(frozen=True)
+class Performance:
+    """A timeline frame by frame, from the first that it keys or renders to the last that it renders.
+
+    controls: slider -> its values, of sliders that are not 0 all the time (blood and the heart are always there).
+    changes: (region, quantity) -> the blood's change. Arrays have the shape of `frames`.
+    """
+
+    frames: np.ndarray
+    controls: Mapping[str, np.ndarray]
+    changes: Mapping[tuple[str, str], np.ndarray]
+
+    def at(self, frame: int) -> dict[tuple[str, str], Change]:
+        """What has moved at a frame."""
+        i = frame - int(self.frames[0])
+        return {key: (float(change[i]),) * 2 for key, change in self.changes.items() if change[i]}
+
+
+def performance(shot: Shot, blood: Blood = BLOOD) -> Performance | None:
+    """The timeline of a shot with the blood that it brings; None of a shot of stills, whose blood is settled.
+
+    It is that of the whole timeline, whichever frames are wanted: one frame alone is the same as in sequence.
+    """
+    if shot.timeline is None:
+        return None
+    first = min(shot.timeline.first, *(key.frame for key in shot.timeline.key))
+    frames = np.arange(first, shot.timeline.last + 1)
+    poses = [pose_at(shot.timeline, int(frame)).controls for frame in frames]
+    names = dict.fromkeys(name for pose in poses for name in pose)
+    every = {name: np.array([pose.get(name, 0.0) for pose in poses]) for name in names}
+    kept = {name: series for name, series in every.items() if series.any() or name == BLOOD_CONTROL}
+    return Performance(frames, kept, blood_over_time(Controls(frames / shot.timeline.fps, kept), blood))
+
+
+def feelings_of(shot: Shot) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The emotions and the states that some moment of the shot shows."""
+    poses = shot.timeline.key if shot.timeline else shot.expression
+    emotions = dict.fromkeys(name for pose in poses for name, value in pose.emotions.items() if value > 0.0)
+    states = dict.fromkeys(name for pose in poses for name, value in pose.states.items() if value > 0.0)
+    return tuple(emotions), tuple(states)
 
 
 def scene_of(
@@ -323,13 +422,15 @@ def scene_of(
 ) -> Scene:
     """What the planner may know of one subject of a shot. maps: ranges of those that came with the face (`Scene.maps`)."""
     frames = []
+    timeline = performance(shot)
     for job in jobs(shot):
         if job.subject != subject.id:
             continue
         pose = pose_of(shot, job)
-        emotions = {name: value for name, value in pose.emotions.items() if value > 0.0}
-        moves = bool(emotions) or any(value > 0.0 for value in pose.action_units.values())
-        frames.append(Frame(job.id, emotions, pose.blood, moves))
+        feelings = {name: value for name, value in pose.feelings.items() if value > 0.0}
+        moves = any(value > 0.0 for value in (*pose.emotions.values(), *pose.action_units.values()))
+        changes = timeline.at(job.frame) if timeline else None
+        frames.append(Frame(job.id, feelings, pose.blood, changes, moves))
     return Scene(
         skin=subject.whole_skin(),
         frames=tuple(frames),

@@ -1,41 +1,48 @@
-"""What perfusion and oxygenation share: the change of one blood quantity by emotion and region."""
+"""What perfusion and oxygenation share: the change of one blood quantity by emotion, state and region."""
 
 from __future__ import annotations
 
-from ..blood import blood_bounds, blood_property
-from .effect import Activation, Bounds, Effect, Fragment, Scene, ShaderInput, shift_bounds
+from ..blood import Change, blood_property, settled
+from ..vascular import reach
+from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scene, ShaderInput, shift_bounds
 from .regions import mask_inputs, masked_sum
+
+
+def frame_changes(frame: Frame, mixable: bool) -> dict[tuple[str, str], Change]:
+    """(region, quantity) -> change at a moment. mixable: of every mix of its sliders, not of their values alone."""
+    if frame.changes is not None:
+        return dict(frame.changes)
+    if mixable:
+        return reach(frame.emotions)
+    return {key: (value, value) for key, value in settled(frame.emotions, frame.blood).items()}
 
 
 def blood_effect(effect_id: str, label: str, help: str, quantity: str) -> Effect:
     """An effect that adds the emotion-driven change of `quantity` in every region it moves in."""
 
-    def changes(scene: Scene) -> dict[str, tuple[float, float]]:
-        """Region -> lowest and highest change over the frames, regions that stay as they are left out."""
-        found: dict[str, tuple[float, float]] = {}
+    def moment(scene: Scene, frame: Frame) -> dict[str, Change]:
+        """Region -> lowest and highest change, of what moves and has a mask."""
+        moved = frame_changes(frame, scene.live)
+        found = ((region, moved.get((region, quantity), (0.0, 0.0))) for region in (*scene.regions, ELSEWHERE))
+        return {region: change for region, change in found if change != (0.0, 0.0)}
+
+    def changes(scene: Scene) -> dict[str, Change]:
+        """The same over all frames, rest included."""
+        found: dict[str, Change] = {}
         for frame in scene.frames:
-            for region in scene.regions:
-                low, high = blood_bounds(frame.emotions, frame.blood, region, quantity, mixable=scene.live)
-                if low or high:
-                    before = found.get(region, (0.0, 0.0))
-                    found[region] = min(before[0], low), max(before[1], high)
+            for region, (low, high) in moment(scene, frame).items():
+                before = found.get(region, (0.0, 0.0))
+                found[region] = min(before[0], low), max(before[1], high)
         return found
 
     def activate(scene: Scene) -> Activation:
-        if not scene.regions:
-            return Activation(False, "the face has no region masks")
-        frames = tuple(
-            frame.id
-            for frame in scene.frames
-            if any(
-                blood_bounds(frame.emotions, frame.blood, r, quantity, mixable=scene.live) != (0.0, 0.0)
-                for r in scene.regions
-            )
-        )
+        frames = tuple(frame.id for frame in scene.frames if moment(scene, frame))
         if not frames:
-            return Activation(False, f"no emotion of the shot moves {quantity}")
-        emotions = sorted({e for frame in scene.frames if frame.id in frames for e, v in frame.emotions.items() if v})
-        return Activation(True, f"{', '.join(emotions)} move{'s' if len(emotions) == 1 else ''} {quantity}", frames)
+            if not scene.regions and any(frame_changes(frame, scene.live) for frame in scene.frames):
+                return Activation(False, "the face has no region masks")
+            return Activation(False, f"no emotion or state of the shot moves {quantity}")
+        names = sorted({e for frame in scene.frames if frame.id in frames for e, v in frame.emotions.items() if v})
+        return Activation(True, f"{', '.join(names)} move{'s' if len(names) == 1 else ''} {quantity}", frames)
 
     def fragments(scene: Scene) -> tuple[Fragment, ...]:
         terms = {region: blood_property(quantity, region) for region in changes(scene)}

@@ -10,23 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ..blood import ELSEWHERE as ELSEWHERE
+from ..blood import Change
 from ..parameters import PARAMETERS, Skin
 
 Interval = tuple[float, float]
 Bounds = Mapping[str, Mapping[str, Interval]]
 """chromophore id -> region id -> the lowest and highest value it takes there."""
 
-ELSEWHERE = "elsewhere"
-"""The skin that no region mask covers."""
-
 
 @dataclass(frozen=True)
 class Frame:
-    """One moment of a shot: which emotions are on, each 0-1, and how strongly blood answers."""
+    """One moment of a shot: which emotions and states are on, and how strongly blood answers."""
 
     id: str
     emotions: Mapping[str, float] = field(default_factory=dict)
     blood: float = 1.0
+    # (region, quantity) -> the change of blood at this moment, lowest and highest; None: settled, as `emotions` ask.
+    changes: Mapping[tuple[str, str], Change] | None = None
     # False when neither an emotion nor an action unit moves the face.
     moves: bool = True
 
@@ -60,6 +61,8 @@ class Scene:
     # Whether the face has shape keys, by which it moves, and a vertex group (or attribute) of outer pressure.
     shape_keys: bool = True
     pressure: bool = False
+    # Whether the rig has a slider by which the pressure comes and goes.
+    presses: bool = False
 
 
 @dataclass(frozen=True)

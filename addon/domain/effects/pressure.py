@@ -14,21 +14,26 @@ ATTRIBUTE = "sanguine_pressure"
 LOG_HEMOGLOBIN = math.log(0.3)
 
 
+PROPERTY = "pressure"
+"""Custom property of the face: how hard it presses now, 0 to 1, of a face whose rig has a slider for it."""
+
+
 def _activate(scene: Scene) -> Activation:
     if not scene.pressure:
         return Activation(False, f"the face has no vertex group or attribute {ATTRIBUTE}")
     return strength_activation(scene, "pressure")
 
 
-def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
+def _fragments(scene: Scene) -> tuple[Fragment, ...]:
     fragment = Fragment(
         stage="chromophores",
         file="pressure.osl",
         inputs=(
             ShaderInput(ATTRIBUTE, "float", "vertex:weight", ATTRIBUTE),
             ShaderInput("pressure", "float", "strength", "pressure"),
+            *([ShaderInput("pressing", "float", "object", PROPERTY)] if scene.presses else []),
         ),
-        defines={"PRESSURE_LOG_HEMOGLOBIN": f"({LOG_HEMOGLOBIN:.6f})"},
+        defines={"PRESSURE_LOG_HEMOGLOBIN": f"({LOG_HEMOGLOBIN:.6f})", "PRESSING": "pressing" if scene.presses else "1.0"},
     )
     return (fragment,)
 

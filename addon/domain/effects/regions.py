@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..blood import ANATOMY
-from .effect import Scene, ShaderInput
+from .effect import ELSEWHERE, Scene, ShaderInput
 
 FACE_REGIONS = tuple(ANATOMY)
 """Every region a face can have masks for, in the order in which masks are packed."""
@@ -22,11 +22,11 @@ def region_images(regions: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
 
 
 def mask_inputs(scene: Scene, regions: tuple[str, ...]) -> tuple[ShaderInput, ...]:
-    """The images that hold the masks of `regions`."""
+    """The images that hold the masks of `regions`; what is elsewhere is known by all of them."""
     return tuple(
         ShaderInput(image, "color", "map", image)
         for image, held in region_images(scene.regions).items()
-        if set(held) & set(regions)
+        if ELSEWHERE in regions or set(held) & set(regions)
     )
 
 
@@ -37,4 +37,7 @@ def masked_sum(scene: Scene, terms: Mapping[str, str]) -> str:
         for image, held in region_images(scene.regions).items()
         for i, region in enumerate(held)
     }
+    if ELSEWHERE in terms:
+        # Rounded masks may sum to a little more than 1.
+        channel[ELSEWHERE] = f"max(0.0, {' - '.join(['1.0', *channel.values()])})"
     return "(" + " + ".join(f"{channel[region]} * {term}" for region, term in terms.items()) + ")"
