@@ -20,7 +20,7 @@ from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CO
 from ..domain.effects import pressure
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
-from .blood import blood_properties, blood_sliders, drive_settled
+from .blood import blood_properties, blood_sliders, drive_settled, remove_blood_drivers
 from .controls import CONTROL_BONE
 from .curves import action_curve, curves, ensure_action, remove_curve, set_keys
 
@@ -67,11 +67,10 @@ def bake_blood(
 def write_blood(face: bpy.types.Object, frames: np.ndarray, changes: Mapping[str, np.ndarray]) -> None:
     """Puts the changes, by property, on the face as curves, in the place of its drivers. What does not change gets none."""
     ensure_action(face, f"{face.name} blood")
+    remove_blood_drivers(face)
     for name in blood_properties(face):
         path = f'["{name}"]'
-        face.driver_remove(path)
         remove_curve(face, path)
-        face[name] = 0.0
         series = changes.get(name)
         if series is not None and np.any(series):
             set_keys(action_curve(face, path, group="Blood"), *_without_still(frames, series))

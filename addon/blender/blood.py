@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 import bpy
 
 from ..domain.blood import BLOOD, BLOOD_DRIVERS, MOOD_SUFFIX, PRESSURE_CONTROL, PULSE_CONTROL, BloodChannel
 from ..domain.effects import pressure
 from ..domain.facs import EMOTION_CONTROLS
-from ..domain.response import Response
+from ..domain.response import MAX_EXPRESSION, Response, Sum, driver_text
 from .controls import CONTROL_BONE, describe, drive
+
+
+# Partial sums of a channel, this many sliders each: 255 characters hold them with any values and short names.
+_PART = "_part"
+_PART_TERMS = 14
 
 
 def blood_properties(face: bpy.types.Object) -> tuple[str, ...]:
     """The properties by which the material of a face reads its blood."""
-    return tuple(name for name in face.keys() if name.startswith("blood_") or name == pressure.PROPERTY)
+    return tuple(name for name in _ours(face) if _PART not in name)
+
+
+def _ours(face: bpy.types.Object) -> list[str]:
+    return [name for name in face.keys() if name.startswith("blood_") or name == pressure.PROPERTY]
 
 
 def blood_sliders(armature: bpy.types.Object) -> tuple[str, ...]:
@@ -40,12 +50,28 @@ def drive_blood(
     names = []
     for channel in channels:
         name, response = channel.property_name, channel.response
-        skin[name] = 0.0
         what = "blood volume fraction" if channel.quantity == "hemoglobin" else "oxygenation"
-        describe(skin, name, f"Change of {what} in the region {channel.region}, driven by the emotions", *channel.reach, 0.0)
-        drive(skin, f'["{name}"]', response, armature)
+        help = f"Change of {what} in the region {channel.region}, driven by the emotions"
+        skin[name] = 0.0
+        describe(skin, name, help, *channel.reach, 0.0)
+        if len(driver_text(response)[0]) < MAX_EXPRESSION:
+            drive(skin, f'["{name}"]', response, armature)
+        else:
+            _drive_in_parts(armature, skin, name, response)
         names.append(name)
     return tuple(names)
+
+
+def _drive_in_parts(armature: bpy.types.Object, skin: bpy.types.Object, name: str, response: Response) -> None:
+    """A sum of too many sliders for one driver: partial sums are properties of their own."""
+    parts = {}
+    for i in range(0, len(response.terms), _PART_TERMS):
+        part = f"{name}{_PART}{len(parts)}"
+        parts[part] = Sum(response.terms[i : i + _PART_TERMS])
+        skin[part] = 0.0
+        drive(skin, f'["{part}"]', parts[part], armature)
+    total = replace(response, terms=tuple((1.0, part) for part in parts))
+    drive(skin, f'["{name}"]', total, armature, own=parts)
 
 
 def drive_pressure(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
@@ -57,9 +83,20 @@ def drive_pressure(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
 
 def remove_blood(skin: bpy.types.Object) -> None:
     """Removes the properties of `drive_settled` and their drivers."""
-    for name in blood_properties(skin):
+    for name in _ours(skin):
         skin.driver_remove(f'["{name}"]')
         del skin[name]
     animation = skin.animation_data
     if animation and not (animation.drivers or animation.action or animation.nla_tracks):
         skin.animation_data_clear()
+
+
+def remove_blood_drivers(skin: bpy.types.Object) -> None:
+    """Leaves the properties that the material reads at 0, without drivers."""
+    kept = blood_properties(skin)
+    for name in _ours(skin):
+        skin.driver_remove(f'["{name}"]')
+        if name in kept:
+            skin[name] = 0.0
+        else:
+            del skin[name]

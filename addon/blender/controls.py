@@ -7,7 +7,7 @@ and as a library override. That is why every driver is a simple expression and n
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -380,9 +380,16 @@ def _edit_bones(armature: bpy.types.Object) -> Iterator[bpy.types.ArmatureEditBo
         objects.active = active
 
 
-def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.Object, index: int = -1) -> None:
-    """Drives `path` (of an array: its element `index`) of `owner` by a formula of controls. Raises ValueError, naming
-    the path, where Blender cannot."""
+def drive(
+    owner: bpy.types.ID,
+    path: str,
+    formula: Formula,
+    armature: bpy.types.Object,
+    index: int = -1,
+    own: Collection[str] = (),
+) -> None:
+    """Drives `path` (of an array: its element `index`) of `owner` by a formula of controls, of which `own` are custom
+    properties of the owner itself. Raises ValueError, naming the path, where Blender cannot."""
     expression, variables = driver_text(formula)
     if len(expression) >= MAX_EXPRESSION:
         raise ValueError(f"{path}: driver of {len(expression)} characters, Blender keeps {MAX_EXPRESSION - 1}: split it")
@@ -394,8 +401,8 @@ def drive(owner: bpy.types.ID, path: str, formula: Formula, armature: bpy.types.
     for name, control in variables.items():
         variable = driver.variables.new()
         variable.name = name
-        variable.targets[0].id = armature
-        variable.targets[0].data_path = _target_path(control)
+        variable.targets[0].id = owner if control in own else armature
+        variable.targets[0].data_path = f'["{control}"]' if control in own else _target_path(control)
     driver.expression = expression
     if not (driver.is_valid and driver.is_simple_expression):
         owner.driver_remove(path, index)

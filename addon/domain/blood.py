@@ -39,9 +39,6 @@ PRESSURE_CONTROL = "pressure"
 MOOD_SUFFIX = "_blood"
 """`anger_blood` moves the blood of anger without its muscles: for captured performances, which have the muscles."""
 
-STATES: dict[str, str] = {}
-"""States of the body (exertion, cold, ...) -> help: sliders 0-1 that move blood and no muscle."""
-
 
 class Evidence(Row):
     """One row of rigs/evidence.csv: what was seen, in whom, by whom."""
@@ -157,7 +154,152 @@ class BloodChannel:
         return Response(terms, self.low, self.high, gain=BLOOD_CONTROL)
 
     @property
-    def blood_change(controls: Mapping[str, float], region: str, amount: float = 1.0) -> tuple[float, float]:
+    def reach(self) -> Change:
+        """Lowest and highest value that any mix of the sliders brings."""
+        ends = [drive.value * control_max(drive.control) for drive in self.drives]
+        low, high = sum(end for end in ends if end < 0.0), sum(end for end in ends if end > 0.0)
+        return BLOOD_CONTROL_MAX * max(low, self.low), BLOOD_CONTROL_MAX * min(high, self.high)
+
+
+@dataclass(frozen=True)
+class Blood:
+    """Every change by (region, quantity) of every emotion and state, on the skin that they were sized on."""
+
+    reference: Reference
+    anatomy: Mapping[str, Rest]
+    drives: Mapping[tuple[str, str], tuple[Drive, ...]]
+
+    def channels(self, controls: Collection[str]) -> dict[tuple[str, str], BloodChannel]:
+        """(region, quantity) -> channel, of a rig that has these sliders. What none of them moves is left out."""
+        made = {}
+        for (region, quantity), drives in self.drives.items():
+            found = [drive for drive in drives if drive.control in controls]
+            found += [
+                replace(drive, control=mood) for drive in drives if (mood := drive.control + MOOD_SUFFIX) in controls
+            ]
+            if found:
+                # Limits are the vessels' own, so that the same mix gives the same blood on every rig.
+                low, high = self._limits(region, quantity, drives)
+                made[region, quantity] = BloodChannel(region, quantity, tuple(found), low, high)
+        return made
+
+    def _limits(self, region: str, quantity: str, drives: Iterable[Drive]) -> Change:
+        """As far as the strongest single slider goes, and with the artist's exaggeration no further than skin can."""
+        ends = [drive.value * control_max(drive.control) for drive in drives]
+        low, high = self.room(region, quantity)
+        return max(min(0.0, *ends), low), min(max(0.0, *ends), high)
+
+    def room(self, region: str, quantity: str) -> Change:
+        """How far the reference skin may change so that twice of it stays within its limits."""
+        at_rest, limits = self.at_rest(region, quantity), getattr(self.reference, f"{quantity}_limits")
+        return (limits[0] - at_rest) / BLOOD_CONTROL_MAX, (limits[1] - at_rest) / BLOOD_CONTROL_MAX
+
+    def at_rest(self, region: str, quantity: str) -> float:
+        """The reference skin's own value in a region."""
+        rest = self.anatomy.get(region, Rest())
+        if quantity == "hemoglobin":
+            return self.reference.hemoglobin * rest.hemoglobin
+        return self.reference.oxygenation + rest.oxygenation
+
+
+def control_max(control: str) -> float:
+    """How far the slider of an emotion or state goes."""
+    return EMOTION_MAX if control.removesuffix(MOOD_SUFFIX) in EMOTION_CONTROLS else 1.0
+
+
+def blood_property(quantity: str, region: str) -> str:
+    """Name of the object property that carries the change into the material."""
+    return f"blood_{quantity}_{region}"
+
+
+def read_anatomy(path: Path, evidence: Mapping[str, Evidence]) -> dict[str, Rest]:
+    """Region -> its skin at rest. Raises InputError for a pair given twice or a source that is not in `evidence`."""
+    values: dict[str, dict[str, float]] = {}
+    for row in read_table(path, _Anatomy).baseline:
+        where = f"{path}: {row.region} {row.quantity}"
+        _check_source(row.source, evidence, where)
+        region = values.setdefault(row.region, {})
+        if row.quantity in region:
+            raise InputError(f"{where}: given twice, remove one")
+        region[row.quantity] = row.value
+    return {region: Rest(**row) for region, row in values.items()}
+
+
+def read_states(path: Path) -> dict[str, StateRow]:
+    """States of the body by name. Raises InputError for one that has the name of an emotion."""
+    states = read_table(path, _States).state
+    for name in states:
+        if name in EMOTION_CONTROLS:
+            raise InputError(f"{path}: state.{name}: an emotion has this name, choose another")
+    return states
+
+
+def read_blood(
+    path: Path, anatomy: Mapping[str, Rest], evidence: Mapping[str, Evidence], states: Collection[str] = ()
+) -> Blood:
+    """Raises InputError for unknown names and for changes that no skin could make."""
+    table = read_table(path, _Blood)
+    blood = Blood(table.reference, anatomy, {})
+    drives: dict[tuple[str, str], dict[str, Drive]] = {}
+    for kind, known, rows in (("emotion", EMOTION_CONTROLS, table.emotion), ("state", states, table.state)):
+        for group in rows:
+            if group.name not in known:
+                raise InputError(f"{path}: {kind}: {group.name}: no such {kind}, {nearest(group.name, known)}")
+            for row in group.change:
+                where = f"{path}: {group.name} {row.region} {row.quantity}"
+                _check_source(row.source, evidence, where)
+                if row.region not in (*anatomy, ELSEWHERE):
+                    raise InputError(f"{where}: no such region, {nearest(row.region, (*anatomy, ELSEWHERE))}")
+                _check_plausible(row, blood, where)
+                channel = drives.setdefault((row.region, row.quantity), {})
+                if group.name in channel:
+                    raise InputError(f"{where}: given twice, remove one")
+                kinetics = row.kinetics or group.kinetics or _usual_kinetics(row)
+                channel[group.name] = Drive(group.name, row.value, kinetics)
+    return replace(blood, drives={key: tuple(channel.values()) for key, channel in drives.items()})
+
+
+def _usual_kinetics(row: ChangeRow) -> str:
+    if row.quantity == "oxygenation":
+        return "oxygenation"
+    return "dilation" if row.value >= 0.0 else "constriction"
+
+
+def _check_source(sources: tuple[str, ...], evidence: Mapping[str, Evidence], where: str) -> None:
+    for source in sources:
+        if source not in evidence:
+            raise InputError(f"{where}: source: {source}: no such row in evidence.csv, {nearest(source, evidence)}")
+
+
+def _check_plausible(row: ChangeRow, blood: Blood, where: str) -> None:
+    low, high = blood.room(row.region, row.quantity)
+    if not low <= row.value <= high:
+        limits = getattr(blood.reference, f"{row.quantity}_limits")
+        raise InputError(
+            f"{where}: {row.value} would take the reference skin beyond {limits[0]:g} to {limits[1]:g} at {BLOOD_CONTROL} = "
+            f"{BLOOD_CONTROL_MAX:g}: keep it from {low:.4f} to {high:.4f}"
+        )
+
+
+EVIDENCE: dict[str, Evidence] = {row.id: row for row in read_rows(rigs_path("evidence.csv"), Evidence)}
+ANATOMY: dict[str, Rest] = read_anatomy(rigs_path("anatomy.toml"), EVIDENCE)
+STATES: dict[str, StateRow] = read_states(rigs_path("states.toml"))
+BLOOD: Blood = read_blood(rigs_path("blood.toml"), ANATOMY, EVIDENCE, STATES)
+
+BLOOD_DRIVERS: tuple[str, ...] = (*EMOTION_CONTROLS, *STATES)
+"""Every slider that moves blood."""
+
+
+def settled(
+    controls: Mapping[str, float], amount: float = 1.0, blood: Blood = BLOOD
+) -> dict[tuple[str, str], float]:
+    """(region, quantity) -> settled change under a mix of emotions and states; what does not move is left out."""
+    values = {**controls, BLOOD_CONTROL: amount}
+    moved = {key: channel.response.value(values) for key, channel in blood.channels(controls).items()}
+    return {key: value for key, value in moved.items() if value}
+
+
+def blood_change(controls: Mapping[str, float], region: str, amount: float = 1.0) -> tuple[float, float]:
     """Settled change of (hemoglobin, oxygenation) in `region` under a mix of emotions and states."""
     moved = settled(controls, amount)
     return moved.get((region, "hemoglobin"), 0.0), moved.get((region, "oxygenation"), 0.0)

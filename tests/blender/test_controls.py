@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mathutils import Vector
 
 from sanguine.blender import blood, controls
-from sanguine.domain.blood import BLOOD_CHANNELS, BLOOD_CONTROL_MAX, blood_change
+from sanguine.domain.blood import BLOOD, BLOOD_CONTROL_MAX, MOOD_SUFFIX, STATES, blood_change, settled
 from sanguine.domain.errors import InputError
 from sanguine.domain.facs import (
     ACTION_UNITS,
@@ -28,9 +28,15 @@ from sanguine.domain.facs import (
 )
 from sanguine.domain.response import Response
 
+FEELINGS = [*EMOTION_CONTROLS, *STATES]
+CHANNELS = BLOOD.channels(FEELINGS)
+MOODS = [name + MOOD_SUFFIX for name in EMOTION_CONTROLS]
+
 # Few units at once: with all of them at random, what excludes each other leaves nothing to compare.
 mixes = st.fixed_dictionaries(
-    {"blood": st.floats(0.0, BLOOD_CONTROL_MAX)} | {name: st.floats(0.0, EMOTION_MAX) for name in EMOTION_CONTROLS}
+    {"blood": st.floats(0.0, BLOOD_CONTROL_MAX)}
+    | {name: st.floats(0.0, EMOTION_MAX) for name in (*EMOTION_CONTROLS, *MOODS)}
+    | {name: st.floats(0.0, 1.0) for name in STATES}
 ).flatmap(
     lambda emotions: st.dictionaries(st.sampled_from(list(UNIT_CONTROLS)), st.floats(0.0, 1.0), max_size=8).map(
         lambda units: emotions | units
@@ -56,12 +62,12 @@ def add_armature():
 
 @pytest.fixture
 def face():
-    """An armature and a skin with all keys, driven by all emotions."""
+    """An armature and a skin with all keys, driven by all emotions and states."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     armature, skin = add_armature(), add_mesh("skin", SHAPE_KEYS)
-    controls.add_controls(armature, EMOTION_CONTROLS)
+    controls.add_controls(armature, EMOTION_CONTROLS, (*STATES, *MOODS))
     controls.drive_shape_keys(armature, [skin])
-    blood.drive_blood(armature, skin, BLOOD_CHANNELS.values())
+    blood.drive_blood(armature, skin, BLOOD.channels([*FEELINGS, *MOODS]).values())
     return armature, skin
 
 
@@ -69,7 +75,7 @@ def evaluated(skin):
     """Shape key values and blood properties after evaluation."""
     result = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
     keys = {key.name: key.value for key in result.data.shape_keys.key_blocks}
-    return keys, {c.property_name: result[c.property_name] for c in BLOOD_CHANNELS.values()}
+    return keys, {c.property_name: result[c.property_name] for c in CHANNELS.values()}
 
 
 def evaluated_keys(skin):
@@ -81,14 +87,14 @@ def evaluated_keys(skin):
 @given(values=mixes)
 def test_drivers_equal_the_domain_for_any_mix(face, values):
     armature, skin = face
-    controls.set_controls(armature, dict.fromkeys(controls.CONTROLS, 0.0) | values)
+    at_rest = {name: control.minimum for name, control in controls.CONTROLS.items()}
+    controls.set_controls(armature, {n: v for n, v in at_rest.items() if n in armature.pose.bones["sanguine"]} | values)
     keys, changes = evaluated(skin)
     expected = shape_key_values(values)
     assert {name: keys[name] for name in expected} == pytest.approx(expected, abs=1e-6)
-    emotions = {name: values[name] for name in EMOTION_CONTROLS}
-    for (region, quantity), channel in BLOOD_CHANNELS.items():
-        change = blood_change(emotions, region, values["blood"])[quantity == "oxygenation"]
-        assert changes[channel.property_name] == pytest.approx(change, abs=1e-6)
+    moved = settled({name: values[name] for name in (*FEELINGS, *MOODS)}, values["blood"])
+    for key, channel in CHANNELS.items():
+        assert changes[channel.property_name] == pytest.approx(moved.get(key, 0.0), abs=1e-6)
 
 
 def face_properties(emotions=EMOTION_CONTROLS):
@@ -103,7 +109,8 @@ def drivers_of(*owners):
 
 def test_every_driver_is_a_short_simple_expression(face):
     armature, skin = face
-    assert len(drivers_of(skin, skin.data.shape_keys)) == len(SHAPE_KEYS) + len(BLOOD_CHANNELS)
+    whole = [curve for curve in drivers_of(skin, skin.data.shape_keys) if "_part" not in curve.data_path]
+    assert len(whole) == len(SHAPE_KEYS) + len(CHANNELS)
     assert {curve.data_path[2:-2] for curve in drivers_of(armature)} == set(face_properties())
     for curve in drivers_of(armature, skin, skin.data.shape_keys):
         assert curve.driver.is_valid and curve.driver.is_simple_expression, curve.data_path
@@ -176,22 +183,24 @@ def test_a_driver_that_blender_would_cut_names_its_key(face):
 
 
 def test_controls_have_range_tooltip_and_default_and_can_be_overridden(face):
+    controls.add_controls(face[0], (), controls.OPTIONAL)
     bone = face[0].pose.bones[controls.CONTROL_BONE]
     assert set(bone.keys()) >= set(controls.CONTROLS)
+    others = {"blood": (0.0, 2.0, 1.0), "heart_rate": (20.0, 250.0, 70.0)}
     for name, control in controls.CONTROLS.items():
         ui = bone.id_properties_ui(name).as_dict()
-        assert (ui["min"], ui["max"], ui["soft_max"]) == (0.0, control.maximum, control.soft_maximum)
-        assert control.maximum == (EMOTION_MAX if name in EMOTION_CONTROLS else 2.0 if name == "blood" else 1.0)
-        assert ui["default"] == bone[name] == control.default == (1.0 if name == "blood" else 0.0)
+        low, high, default = others.get(name, (0.0, EMOTION_MAX if name in (*EMOTION_CONTROLS, *MOODS) else 1.0, 0.0))
+        assert (ui["min"], ui["max"], ui["soft_max"]) == (low, high, control.soft_maximum)
+        assert ui["default"] == bone[name] == control.default == default
         assert len(ui["description"]) > 5
         assert bone.is_property_overridable_library(f'["{name}"]')
 
 
 def test_blood_properties_hold_their_whole_range(face):
     _, skin = face
-    for channel in BLOOD_CHANNELS.values():
+    for channel in BLOOD.channels([*FEELINGS, *MOODS]).values():
         ui = skin.id_properties_ui(channel.property_name).as_dict()
-        assert (ui["min"], ui["max"]) == pytest.approx((2.0 * channel.response.low, 2.0 * channel.response.high))
+        assert (ui["min"], ui["max"]) == pytest.approx(channel.reach)
 
 
 def test_missing_and_occupied_keys_are_reported_and_left_alone():
@@ -216,7 +225,7 @@ def test_removal_leaves_no_trace(face):
     controls.set_controls(armature, {"anger": 1.0})
     evaluated(skin)
     controls.remove_shape_key_drivers(armature, [skin, armature])
-    blood.remove_blood(armature, skin)
+    blood.remove_blood(skin)
     controls.remove_controls(armature)
     assert skin.animation_data is None and skin.data.shape_keys.animation_data is None
     assert not skin.keys() and not armature.keys() and not armature.data.bones
@@ -351,7 +360,7 @@ def test_drivers_work_on_a_face_that_was_seen_before_its_armature():
     armature = add_armature()
     controls.add_controls(armature)
     controls.drive_shape_keys(armature, [skin])
-    blood.drive_blood(armature, skin, [BLOOD_CHANNELS["cheeks", "hemoglobin"]])
+    blood.drive_blood(armature, skin, [BLOOD.channels(DEFAULT_EMOTIONS)["cheeks", "hemoglobin"]])
     bpy.context.view_layer.update()
     controls.set_controls(armature, {"anger": 1.0})
     bpy.context.view_layer.update()

@@ -8,20 +8,25 @@ from hypothesis import strategies as st
 
 from sanguine.domain.blood import (
     ANATOMY,
-    BLOOD_CHANNELS,
+    BLOOD,
     BLOOD_CONTROL_MAX,
+    BLOOD_DRIVERS,
+    MOOD_SUFFIX,
+    ELSEWHERE,
     EVIDENCE,
-    blood_bounds,
     blood_change,
     read_anatomy,
+    control_max,
     read_blood,
+    settled,
 )
 from sanguine.domain.errors import InputError
 from sanguine.domain.facs import EMOTION_CONTROLS
 from sanguine.domain.head import load_regions
 from sanguine.domain.resources import rigs_path
 
-mixes = st.fixed_dictionaries({name: st.floats(0.0, 1.0) for name in EMOTION_CONTROLS})
+mixes = st.fixed_dictionaries({name: st.floats(0.0, control_max(name)) for name in BLOOD_DRIVERS})
+CHANNELS = BLOOD.channels(BLOOD_DRIVERS)
 LIGHT_SKIN_BLOOD = 0.014
 
 
@@ -62,25 +67,37 @@ def test_any_mix_stays_within_what_skin_can_hold(emotions, amount):
 
 
 @given(mixes)
-def test_a_mix_is_never_redder_or_paler_than_its_strongest_part(emotions):
+def test_a_mix_is_never_redder_or_paler_than_its_strongest_part(mix):
     for region in ANATOMY:
-        alone = [blood_change({name: 1.0}, region)[0] for name in EMOTION_CONTROLS]
-        assert min(0.0, *alone) <= blood_change(emotions, region)[0] <= max(0.0, *alone)
+        alone = [blood_change({name: control_max(name)}, region)[0] for name in BLOOD_DRIVERS]
+        assert min(0.0, *alone) - 1e-12 <= blood_change(mix, region)[0] <= max(0.0, *alone) + 1e-12
 
 
 @given(mixes, st.floats(0.0, BLOOD_CONTROL_MAX))
-def test_bounds_hold_the_change(emotions, amount):
-    for (region, quantity) in BLOOD_CHANNELS:
-        change = blood_change(emotions, region, amount)[quantity == "oxygenation"]
-        assert blood_bounds(emotions, amount, region, quantity) == (change, change)
-        low, high = blood_bounds({}, 1.0, region, quantity, mixable=True)
-        assert low <= change <= high
+def test_a_channel_reaches_as_far_as_any_mix(mix, amount):
+    moved = settled(mix, amount)
+    for key, channel in CHANNELS.items():
+        low, high = channel.reach
+        assert low - 1e-12 <= moved.get(key, 0.0) <= high + 1e-12
+
+
+@given(st.dictionaries(st.sampled_from(BLOOD_DRIVERS), st.floats(0.0, 1.0), max_size=3), st.sets(st.sampled_from(BLOOD_DRIVERS)))
+def test_what_else_is_on_the_rig_changes_nothing(mix, others):
+    assert settled(mix) == settled({**dict.fromkeys(others - set(mix), 0.0), **mix})
+
+
+def test_a_mood_is_the_blood_of_its_emotion_alone():
+    assert settled({"anger" + MOOD_SUFFIX: 0.7}) == settled({"anger": 0.7})
 
 
 def test_no_emotion_no_change_and_no_channel_without_a_change():
-    assert all(blood_change({}, region) == (0.0, 0.0) for region in ANATOMY)
-    assert all(c.response.low < 0.0 or c.response.high > 0.0 for c in BLOOD_CHANNELS.values())
-    assert blood_bounds({"anger": 1.0}, 1.0, "eyelids", "melanin") == (0.0, 0.0)
+    assert settled({}) == {} and BLOOD.channels([]) == {}
+    assert all(c.low < 0.0 or c.high > 0.0 for c in CHANNELS.values())
+    assert ("eyelids", "oxygenation") not in BLOOD.channels(["anger"])
+
+
+def test_what_is_systemic_reaches_the_skin_between_the_regions():
+    assert settled({"hypoxia": 1.0})[ELSEWHERE, "oxygenation"] < -0.05
 
 
 def test_every_region_of_the_head_has_its_anatomy():
