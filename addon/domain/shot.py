@@ -19,7 +19,7 @@ from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, 
 from .effects import Frame, Growth, Scene
 from .effects.effect import Interval
 from .errors import InputError, nearest
-from .facs import EMOTION_MAX, EMOTIONS, UNIT_CONTROLS, VARIANTS
+from .facs import EMOTIONS, UNIT_CONTROLS, VARIANTS
 from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
@@ -36,15 +36,17 @@ Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
 def _level(value: Any) -> Any:
-    """How far an emotion goes: a number, or the name of a variant."""
+    """How far an emotion goes: a number from 0 to 1, or the name of a variant, of which the extreme one goes further."""
     if isinstance(value, str):
         if value not in VARIANTS:
-            raise ValueError(f"no such variant '{value}', {nearest(value, VARIANTS)}; or give a number, 0 to {EMOTION_MAX:g}")
+            raise ValueError(f"no such variant '{value}', {nearest(value, VARIANTS)}; or give a number, 0 to 1")
         return VARIANTS[value]
+    if isinstance(value, (int, float)) and not 0.0 <= value <= 1.0:
+        raise ValueError(f"{value} is outside 0 to 1; what is more than full is 'extreme'")
     return value
 
 
-Level = Annotated[float, pydantic.Field(ge=0.0, le=EMOTION_MAX, allow_inf_nan=False), pydantic.BeforeValidator(_level)]
+Level = Annotated[float, pydantic.BeforeValidator(_level)]
 
 
 class _Table(pydantic.BaseModel):
@@ -365,7 +367,7 @@ def pose_at(timeline: Timeline, frame: int) -> Pose:
     def blend(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:
         return {name: mix(a.get(name, 0.0), b.get(name, 0.0)) for name in {**a, **b}}
 
-    return Pose(
+    return Pose.model_construct(  # of checked keys; an emotion on its way to the extreme may be above 1
         emotions=blend(before.emotions, after.emotions),
         action_units=blend(before.action_units, after.action_units),
         states=blend(before.states, after.states),

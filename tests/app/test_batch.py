@@ -116,6 +116,7 @@ def test_timeline_and_subjects(tmp_path):
         rig = { head = "male" }
         skin = { melanin = 0.1 }
         [timeline]
+        fps = 1  # blood takes seconds
         first = 1
         last = 9
         step = 4
