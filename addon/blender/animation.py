@@ -7,7 +7,7 @@ import bpy
 from ..domain.blood import STATES
 from ..domain.facs import EMOTION_CONTROLS, EMOTIONS
 from .bake import RECORD, bake_blood, bake_state, clear_bake
-from .blood import blood_properties
+from .blood import blood_properties, drive_settled, remove_blood_drivers
 from .controls import CONTROL_BONE, OPTIONAL, add_controls, drive_shape_keys, remove_emotion
 from .operators import active_face, controls_of, emotion_bone, may_change
 from .poses import add_poses
@@ -36,16 +36,22 @@ _LABELS = {
 }
 
 
-def _others(_operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
-    face = active_face(context)
-    bone = emotion_bone(face) if face else None
-    return [(name, *texts) for name, texts in _LABELS.items() if bone is None or name not in bone]
+# What is chosen is kept as its number, which must not depend on what else is in the list.
+_ITEMS = [(name, label, help, "NONE", i) for i, (name, (label, help)) in enumerate(_LABELS.items())]
 
 
-def _present(_operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
+def _others(_operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str, str, int]]:
+    return [item for item in _ITEMS if not _has(context, item[0])]
+
+
+def _present(_operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str, str, int]]:
+    return [item for item in _ITEMS if _has(context, item[0])]
+
+
+def _has(context: bpy.types.Context, name: str) -> bool:
     face = active_face(context)
     bone = emotion_bone(face) if face else None
-    return [(name, *texts) for name, texts in _LABELS.items() if bone is not None and name in bone]
+    return bone is not None and name in bone
 
 
 class SANGUINE_OT_add_feeling(bpy.types.Operator):
@@ -66,14 +72,15 @@ class SANGUINE_OT_add_feeling(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        rig = rig_of(context)
+        rig, name = rig_of(context), self.feeling
+        emotions, states = ((name,), ()) if name in EMOTION_CONTROLS else ((), (name,))
         try:
-            add_controls(rig, [n for n in [self.feeling] if n in EMOTION_CONTROLS], [n for n in [self.feeling] if n not in EMOTION_CONTROLS])
+            add_controls(rig, emotions, states)
             drive_shape_keys(rig, [child for child in rig.children if child.type == "MESH"])
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{_LABELS[self.feeling][0]} is on the rig. Apply the skin, so that its blood shows")
+        self.report({"INFO"}, f"{_LABELS[name][0]} is on the rig. Apply the skin, so that its blood shows")
         return {"FINISHED"}
 
 
@@ -95,16 +102,17 @@ class SANGUINE_OT_remove_feeling(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        rig, face = rig_of(context), active_face(context)
+        rig, face, name = rig_of(context), active_face(context), self.feeling
         try:
-            clear_bake(face)
-            remove_emotion(rig, self.feeling)
+            clear_bake(face, rig)
+            remove_emotion(rig, name)
             drive_shape_keys(rig, [child for child in rig.children if child.type == "MESH"])
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        clear_bake(face, rig)
-        self.report({"INFO"}, f"{_LABELS[self.feeling][0]} is off the rig")
+        remove_blood_drivers(face)
+        drive_settled(rig, face, blood_properties(face))
+        self.report({"INFO"}, f"{_LABELS[name][0]} is off the rig")
         return {"FINISHED"}
 
 

@@ -44,6 +44,8 @@ class Layout:
     def column(self, **_):
         return self
 
+    row = column
+
 
 def draw(panel):
     layout = Layout()

@@ -1,0 +1,149 @@
+"""The animator's buttons: emotions on demand, Bake Blood, poses, each with undo, each saying what is missing."""
+
+import bpy
+import numpy as np
+import pytest
+
+import sanguine
+from sanguine.blender import controls, panels
+from sanguine.blender.bake import RECORD
+from sanguine.blender.curves import curves
+from sanguine.blender.operators import emotion_bone, live_plan
+from tests.blender.test_addon import draw, grid
+
+
+@pytest.fixture
+def face():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    sanguine.register()
+    yield grid()
+    sanguine.unregister()
+
+
+def slider(face, name):
+    return f'pose.bones["{controls.CONTROL_BONE}"]["{name}"]'
+
+
+def key(face, name, **values):
+    bone = emotion_bone(face)
+    for frame, value in values.items():
+        bone[name] = value
+        bone.keyframe_insert(f'["{name}"]', frame=int(frame[1:]))
+
+
+def test_nothing_can_be_done_before_the_skin(face):
+    for operator in ("add_feeling", "remove_feeling", "bake_blood", "add_poses"):
+        with pytest.raises(RuntimeError, match="no controls yet: apply the skin first"):
+            getattr(bpy.ops.sanguine, operator)()
+    with pytest.raises(RuntimeError, match="No blood is baked"):
+        bpy.ops.sanguine.clear_blood()
+
+
+def test_an_emotion_is_on_the_rig_when_asked_for_and_costs_nothing_before(face):
+    bpy.ops.sanguine.apply_skin()
+    rig, before = face.parent, dict(face.items())
+    fragments = live_plan(face).fragments
+    assert "shame" not in emotion_bone(face)
+    assert bpy.ops.sanguine.add_feeling(feeling="hypoxia") == {"FINISHED"}
+    assert "hypoxia" in emotion_bone(face)
+    assert "blood_oxygenation_elsewhere" not in before
+    assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
+    assert "blood_oxygenation_elsewhere" in face.keys()
+    controls.set_controls(rig, {"hypoxia": 1.0})
+    bpy.context.view_layer.update()
+    assert face["blood_oxygenation_elsewhere"] < -0.05
+    assert live_plan(face).fragments != fragments
+    assert '["hypoxia"]' in draw(panels.SANGUINE_PT_main)
+    assert bpy.ops.sanguine.remove_feeling(feeling="hypoxia") == {"FINISHED"}
+    bpy.ops.sanguine.apply_skin()
+    assert set(face.keys()) == set(before) and live_plan(face).fragments == fragments
+
+
+def test_baking_shows_in_the_panel_whether_it_holds(face):
+    bpy.ops.sanguine.apply_skin()
+    bpy.context.scene.frame_end = 48
+    key(face, "anger", f1=0.0, f12=1.0)
+    assert any("Settled" in line for line in draw(panels.SANGUINE_PT_time))
+    assert bpy.ops.sanguine.bake_blood() == {"FINISHED"}
+    assert RECORD in face and "Baked" in draw(panels.SANGUINE_PT_time)
+    assert len(curves(face)) >= 6
+    key(face, "anger", f30=0.0)
+    assert any("Stale" in line for line in draw(panels.SANGUINE_PT_time))
+    bpy.ops.sanguine.bake_blood()
+    assert "Baked" in draw(panels.SANGUINE_PT_time)
+    bpy.ops.sanguine.clear_blood()
+    assert RECORD not in face and not curves(face)
+    bpy.context.scene.frame_set(12)
+    assert face["blood_hemoglobin_cheeks"] > 0.01
+
+
+def test_a_skin_applied_anew_is_not_baked(face):
+    bpy.ops.sanguine.apply_skin()
+    key(face, "anger", f1=0.0, f12=1.0)
+    bpy.ops.sanguine.bake_blood()
+    bpy.ops.sanguine.apply_skin()
+    assert RECORD not in face and face.animation_data.drivers
+
+
+def test_exaggeration_is_called_so(face):
+    bpy.ops.sanguine.apply_skin()
+
+    def labels():
+        found = []
+
+        class Layout:
+            def prop(self, _data, _name, text="", **_):
+                found.append(text)
+
+            def operator(self, *_, **__):
+                pass
+
+            def column(self, **_):
+                return self
+
+            row = column
+
+        panels.SANGUINE_PT_main.draw(type("Panel", (), {"layout": Layout()})(), bpy.context)
+        return found
+
+    assert "Blood" in labels()
+    emotion_bone(face)["blood"] = 1.5
+    assert "Blood (exaggerated)" in labels()
+
+
+def test_poses_are_assets_that_hold_one_face_each(face):
+    bpy.ops.sanguine.apply_skin()
+    key(face, "anger", f1=0.0, f12=1.0)
+    action = face.parent.animation_data.action
+    assert bpy.ops.sanguine.add_poses() == {"FINISHED"}
+    assert face.parent.animation_data.action == action
+    poses = {a.name.split(": ")[1]: a for a in bpy.data.actions if a.asset_data}
+    assert {"neutral", "anger", "anger, subtle", "anger, extreme", "fear, extreme"} <= set(poses)
+    assert len(poses) == 1 + 3 * 4
+    bpy.ops.sanguine.add_poses()
+    assert len([a for a in bpy.data.actions if a.asset_data]) == len(poses)
+    # Applied as the pose library does: the pose alone, at its frame.
+    animation = face.parent.animation_data
+    animation.action = poses["fear, extreme"]
+    if hasattr(animation, "action_slot"):
+        animation.action_slot = poses["fear, extreme"].slots[0]
+    bpy.context.scene.frame_set(1)
+    bone = emotion_bone(face)
+    assert [bone[name] for name in ("anger", "happy", "sad", "fear")] == pytest.approx([0.0, 0.0, 0.0, 1.5])
+
+
+def test_every_step_can_be_undone(face):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="start")
+    bpy.ops.sanguine.apply_skin()
+    key(face, "anger", f1=0.0, f12=1.0)
+    bpy.ops.ed.undo_push(message="keys")
+    face_name, before = face.name, sorted(face.keys())
+    bpy.ops.sanguine.bake_blood()
+    bpy.ops.ed.undo_push(message="bake")
+    bpy.ops.ed.undo()
+    face = bpy.data.objects[face_name]
+    assert sorted(face.keys()) == before and len(face.animation_data.drivers) >= 6
+    bpy.ops.ed.redo()
+    face = bpy.data.objects[face_name]
+    assert RECORD in face and np.any([curve.evaluate(40) for curve in curves(face)])
