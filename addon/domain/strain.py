@@ -44,7 +44,7 @@ _SMOOTHING = 2  # rounds over the neighbours: strain is constant on a triangle, 
 _FOLD_SMOOTHING = 4
 _FACTORED_VERTICES = 4000
 # What counts when components are chosen, per row: emotions above action units above single keys.
-_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 2.0, 1.0, 0.3
+_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 3.0, 1.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -381,13 +381,14 @@ def _non_negative_keys(
 ) -> np.ndarray:
     """(A, K) >= 0 by which keys drive the basis (A, V): least squares of poses (P, K) times it against rows (P, V).
 
-    alone: (K, V) what each key does by itself; where that is nothing a key drives nothing.
+    alone: (K, V) what each key does by itself; where that is next to nothing (3 % of where it does most) a key drives
+    nothing: half a smile does not fold the other cheek because smiles mostly come whole.
     """
     among, among_keys = _dot("av,bv->ab", basis, basis), _dot("pk,pl->kl", poses, poses)
     wanted = np.maximum(_dot("ap,pk->ak", _dot("av,pv->ap", basis, rows), poses), 0.0)
     own = _dot("av,kv->ak", basis, alone)
     found = own / np.maximum(np.diag(among), 1e-12)[:, None]
-    found[own < 1e-3 * own.max(axis=0, initial=0.0)] = 0.0
+    found[own < 3e-2 * own.max(axis=0, initial=0.0)] = 0.0
     for _ in range(4 * rounds):
         found *= wanted / np.maximum(among @ found @ among_keys, 1e-12)
     return found

@@ -64,7 +64,7 @@ def expected(skin):
 def test_one_evaluation_gives_the_numbers_of_the_domain(face, pose):
     set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0) | pose)
     for found, wanted in zip(driven(face.skin), expected(face.skin), strict=True):
-        # Up to 52 keys leave out less than LEAST each, and coefficients are written to four decimals.
+        # Keys leave out less than LEAST each, and coefficients are written to four decimals.
         assert found == pytest.approx(wanted, abs=20 * LEAST)
         assert np.abs(found - wanted).mean() < LEAST
 
