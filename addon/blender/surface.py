@@ -12,10 +12,10 @@ from ..app.maps import Surface
 from ..domain.effects.pressure import ATTRIBUTE
 from ..domain.effects.regions import FACE_REGIONS
 from ..domain.errors import InputError
-from ..domain.facs import ARKIT
 from ..domain.face_regions import find_regions
 from ..domain.head import load_regions
 from ..domain.head.model import ShapeKey
+from ..domain.naming import recognise
 from ..domain.resources import rigs_path
 from ..domain.strain import ShapeKeys
 
@@ -51,12 +51,13 @@ def find_face_regions(obj: bpy.types.Object) -> str:
     triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     to_metres = _position_scale_mm(obj) / 1000.0
-    keys = {}
-    for key in mesh.shape_keys.key_blocks if mesh.shape_keys else ():
-        if key.name in ARKIT.keys:
-            moved = (_key_positions(key) - _key_positions(key.relative_key)) * to_metres
-            index = np.flatnonzero(moved.any(axis=1))
-            keys[key.name] = ShapeKey(index, moved[index])
+    moves: dict[str, np.ndarray] = {}
+    blocks = mesh.shape_keys.key_blocks if mesh.shape_keys else {}
+    for name, arkit in recognise(blocks.keys()).strongest().items():
+        moved = (_key_positions(blocks[name]) - _key_positions(blocks[name].relative_key)) * to_metres
+        moves[arkit] = moves[arkit] + moved if arkit in moves else moved  # browInnerUp of rigs that have it by side
+    indices = {name: np.flatnonzero(moved.any(axis=1)) for name, moved in moves.items()}
+    keys = {name: ShapeKey(index, moves[name][index]) for name, index in indices.items()}
     found = find_regions(_position_mm(obj) / 1000.0, triangles.reshape(-1, 3), keys, load_regions(rigs_path("regions.toml")))
     store_regions(obj, {region: mask for region, mask in found.regions.items() if region in FACE_REGIONS})
     return found.because

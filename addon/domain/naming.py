@@ -219,6 +219,16 @@ class Recognised:
         """Mesh key -> shares of emotions: keys that are whole expressions."""
         return self._made_of(frozenset(EMOTION_CONTROLS))
 
+    def strongest(self) -> dict[str, str]:
+        """Mesh key -> the one ARKit key that it shows best: where that one goes, it goes. A key for both sides is not in
+        it."""
+        found = {}
+        for key, shares in self.sources.items():
+            first, *rest = sorted(shares, key=lambda name: -shares[name])
+            if first in ARKIT.keys and not (rest and shares[rest[0]] == shares[first]):
+                found[key] = first
+        return found
+
     def expressed(self, keys: Iterable[str]) -> frozenset[str]:
         """The ARKit keys whose work these mesh keys do, whole expressions apart."""
         names = [name for key in keys for name, _ in self.mapping[key] if name not in EMOTIONS]

@@ -52,6 +52,26 @@ def test_regions_are_those_of_the_domain(part):
         assert np.abs(stored[name] - mask).sum() < 0.03 * mask.sum() + 0.5, name
 
 
+def test_regions_are_found_under_other_names(part):
+    """ICT FaceKit's names: with _L and _R, and browInnerUp and cheekPuff split into sides."""
+    face = add_skin(part)
+    line = find_face_regions(face)
+    stored = read_surface(face).regions
+    other = add_skin(part)
+    for block in other.data.shape_keys.key_blocks:
+        block.name = block.name.replace("Left", "_L").replace("Right", "_R")
+    for name in ("browInnerUp", "cheekPuff"):
+        block = other.data.shape_keys.key_blocks[name]
+        block.name = f"{name}_L"
+        half = other.shape_key_add(name=f"{name}_R")
+        half.value = 0.0
+        for left, right, at in zip(block.data, half.data, part.vertices):
+            (right if at[0] < 0 else left).co, (left if at[0] < 0 else right).co = left.co.copy(), at
+    assert find_face_regions(other) == line
+    for name, mask in read_surface(other).regions.items():
+        np.testing.assert_allclose(mask, stored[name], atol=1 / 255 + 1e-6, err_msg=name)
+
+
 def test_centimetres_are_said_and_the_object_scale_is_the_cure(part):
     face = add_skin(part, 100.0)
     assert "scale the face by 0.01" in find_face_regions(face)

@@ -219,6 +219,13 @@ def test_mpfb_units_are_those_of_the_package_with_measured_shares():
             assert share == pytest.approx(min(projection, most), abs=0.051), (key, target)
 
 
+def test_the_strongest_source_tells_where_a_key_acts():
+    strongest = recognise(conventions()["mpfb"].rows()).strongest()
+    assert strongest["eye-left-closure"] == "eyeBlinkLeft" and strongest["mouth-pursing"] == "mouthPucker"
+    assert "mouth-corner-puller" not in strongest
+    assert recognise(ICT).strongest()["browInnerUp_R"] == "browInnerUp"
+
+
 def test_a_half_rig_works_and_lists_the_rest():
     have = [key for key in ARKIT.keys if key.startswith(("brow", "mouth"))]
     found = recognise([*have, "Breathe", "corrective_01"])
