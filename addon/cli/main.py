@@ -71,6 +71,12 @@ def _parser() -> argparse.ArgumentParser:
                      help="let these go where the data lead, for example melanin_blend or bilirubin_umol_per_l")
     fit.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    names = _verb(verbs, "names", _names, "what the shape keys of a rig are: ARKit, FACS, VRM, MetaHuman, MPEG-4 and others")
+    names.add_argument("rig", metavar="FILE", help=".gltf, .glb, .vrm, or a text file with a key's name on each line")
+    names.add_argument("--own", action="append", default=[], metavar="NAMES.toml",
+                       help="names of your own (docs/names.md), tried before those that come with Sanguine; may be repeated")
+    names.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     capture = _verb(verbs, "capture", _capture, "a recorded face (Live Link Face, OpenFace, MediaPipe) as curves on the controls")
     capture.add_argument("recording", metavar="FILE.csv")
     capture.add_argument("--fps", type=_positive, default=24.0, metavar="X",
@@ -240,6 +246,18 @@ def _fit(options: argparse.Namespace) -> int:
     if options.specular == "auto":
         print(f"sanguine: specular taken as {report['specular']} (--specular says otherwise)", file=sys.stderr)
     _answer(report, options.out)
+    return 0
+
+
+def _names(options: argparse.Namespace) -> int:
+    from pathlib import Path
+
+    from ..app.rig_names import names_report
+    from ..domain.files import check_file
+    from ..domain.naming import read_names
+
+    check_file(options.out)
+    _answer(names_report(options.rig, {Path(own).stem: read_names(own) for own in options.own}), options.out)
     return 0
 
 

@@ -2,6 +2,7 @@
 
 import re
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -402,6 +403,17 @@ def test_drivers_of_foreign_keys_fit_in_blender(name, emotions):
     found = recognise([prefix + key for prefix in names.prefixes or ("",) for key in names.rows()])
     for key, response in mesh_responses(found, formulas(emotions), emotions).items():
         assert len(driver_text(response)[0]) < MAX_EXPRESSION, key
+
+
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_the_page_has_the_numbers(name):
+    names = conventions()[name]
+    found = recognise([prefix + key for prefix in names.prefixes or ("",) for key in names.rows()])
+    emotions = {emotion for shares in found.emotions.values() for emotion in shares}
+    page = Path(__file__).parents[2] / "docs/names.md"
+    (row,) = [line for line in page.read_text().splitlines() if line.startswith(f"| `{name}` |")]
+    counts = [int(cell) for cell in row.split("|")[3:7]]
+    assert counts == [len(names.rows()), len(names.absent), 52 - len(found.missing), len(emotions)]
 
 
 def test_all_files_are_listed():
