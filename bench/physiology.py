@@ -1,7 +1,7 @@
 """What the estimator of `sanguine physiology` holds on studies whose truth is known: the tables of docs/physiology.md.
 
-    .venv/bin/python bench/physiology.py            # prints Markdown, some minutes
-    .venv/bin/python bench/physiology.py --example  # writes examples/recording.csv and the plots of the page anew
+.venv/bin/python bench/physiology.py            # prints Markdown, some minutes
+.venv/bin/python bench/physiology.py --example  # writes examples/recording.csv and the plots of the page anew
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def changes_of(recording, settling=Settling(), lag_s=0.0):  # noqa: B008
 def coverage(studies: int) -> None:
     error = 1.96 * np.sqrt(0.95 * 0.05 / studies)
     print(f"\n## Coverage of the 95 % intervals, {studies} studies each (95 % +- {100 * error:.1f} by chance)\n")
-    print("| studies | pooled t | pooled bootstrap | women t | men t | women - men (Welch) | d_z, men | bias of the pooled change |")
+    print(
+        "| studies | pooled t | pooled bootstrap | women t | men t | women - men (Welch) | d_z, men | bias of the pooled change |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     for name, (design, settling) in CASES.items():
         answer = design.answers[H, "anger"]
@@ -126,12 +128,16 @@ def false_alarms(studies: int) -> None:
         for name in names[1:]:
             found = estimate_lag([c for c in cleaned if c.track.measure.id == name])
             lag[name] = found.value_s if found.usable else 0.0
-        changes, _ = subject_changes((c.track, levels(c, lag.get(c.track.measure.id, 0.0), Settling())) for c in cleaned)
+        changes, _ = subject_changes(
+            (c.track, levels(c, lag.get(c.track.measure.id, 0.0), Settling())) for c in cleaned
+        )
         findings = change_findings(changes, POOLED, effects=False)
         any_ += any(f.supported for f in findings)
         raw += any(f.estimate.p < 0.05 for f in findings)
         sexes += any(f.supported for f in sex_findings(changes, effects=False))
-    print(f"\n## Anything found in a study of nothing: {len(emotions) * len(names)} tests each, lag estimated, {studies} studies\n")
+    print(
+        f"\n## Anything found in a study of nothing: {len(emotions) * len(names)} tests each, lag estimated, {studies} studies\n"
+    )
     print("| | share of studies |\n|---|---|")
     for what, count in (("uncorrected", raw), ("Holm", any_), ("Holm, women - men", sexes)):
         print(f"| {what} | {100 * count / studies:.1f} % |")
@@ -139,7 +145,9 @@ def false_alarms(studies: int) -> None:
 
 def lags(studies: int) -> None:
     print(f"\n## The lag of a pulse sampled every 2 s, {studies} studies of 12 people each\n")
-    print("| answer | true lag | mean estimate | within one sample | interval holds it | usable |\n|---|---|---|---|---|---|")
+    print(
+        "| answer | true lag | mean estimate | within one sample | interval holds it | usable |\n|---|---|---|---|---|---|"
+    )
     for name, size, spread in (("10 +- 4 /min", 10.0, 4.0), ("3 +- 4 /min", 3.0, 4.0), ("none", 0.0, 0.0)):
         for lag_s in (0.0, 6.0, 14.0):
             answers = {("pulse", e): Answer(size, size, spread, spread) for e in ("anger", "fear")}
@@ -150,7 +158,10 @@ def lags(studies: int) -> None:
             held = np.mean([lag.low_s <= lag_s <= lag.high_s for lag in found])
             usable = np.mean([lag.usable for lag in found])
             close = np.mean(np.abs(value - lag_s) <= 2.0)
-            print(f"| {name} | {lag_s:g} s | {value.mean():.1f} s | {100 * close:.0f} % | {100 * held:.0f} % | {100 * usable:.0f} % |", flush=True)
+            print(
+                f"| {name} | {lag_s:g} s | {value.mean():.1f} s | {100 * close:.0f} % | {100 * held:.0f} % | {100 * usable:.0f} % |",
+                flush=True,
+            )
 
 
 def example(folder: Path) -> None:

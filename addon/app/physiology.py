@@ -124,7 +124,9 @@ def read_recordings(paths: Sequence[str | os.PathLike[str]], settings: Settings)
             if other.sha256 == recording.sha256:
                 raise InputError(f"{path}: the same samples as in {other.file}: give each file once")
             if other.file == recording.file:
-                raise InputError(f"{path}: another recording has this name: reports could not tell them apart, rename one")
+                raise InputError(
+                    f"{path}: another recording has this name: reports could not tell them apart, rename one"
+                )
         for track in recording.tracks:
             sex, file = sexes.setdefault(track.subject, (track.sex, recording.file))
             if sex != track.sex:
@@ -204,7 +206,9 @@ def _lags(cleaned: Sequence[Clean], settings: Settings, warnings: list[str]) -> 
         if lag.usable:
             used[measure.id] = lag.value_s
         elif lag.value_s is None:
-            warnings.append(f"{measure.id}: too few onsets of emotions to estimate the sensor's lag: taken as 0 s (--lag-s)")
+            warnings.append(
+                f"{measure.id}: too few onsets of emotions to estimate the sensor's lag: taken as 0 s (--lag-s)"
+            )
         else:
             warnings.append(
                 f"{measure.id}: the sensor's lag cannot be told from these data (95 % interval {lag.low_s:.0f} to "
@@ -229,7 +233,9 @@ def _lost_warnings(lost: Sequence[Track], cleaned: Sequence[Clean], settled: Seq
             key = (c.track.file, c.track.measure.id)
             gone[key] = gone.get(key, 0) + unsettled
     for (file, measure), count in gone.items():
-        warnings.append(f"{file}: {measure}: {count} episodes of emotion left out: no settled good samples (--settle-s)")
+        warnings.append(
+            f"{file}: {measure}: {count} episodes of emotion left out: no settled good samples (--settle-s)"
+        )
     return warnings
 
 
@@ -299,7 +305,9 @@ def report(done: Study) -> dict[str, Any]:
 def _cleaning_report(done: Study) -> list[dict[str, Any]]:
     rows = {}
     for c, own in zip(done.tracks, done.levels, strict=True):
-        row = rows.setdefault(c.track.measure.id, dict.fromkeys(("samples", *REASONS, "unsettled_or_unlabelled", "used"), 0))
+        row = rows.setdefault(
+            c.track.measure.id, dict.fromkeys(("samples", *REASONS, "unsettled_or_unlabelled", "used"), 0)
+        )
         for reason, count in c.counts.items():
             row[reason] += count
         used = sum(level.samples for level in own)
@@ -353,7 +361,9 @@ def summary(done: Study) -> list[str]:
         interval = ""
         if estimate.low is not None:
             interval = f" ({_human(finding.measure, estimate.low)} to {_human(finding.measure, estimate.high)})"
-        lines.append(f"{what}: {_human(finding.measure, estimate.mean)}{interval}, {estimate.n} subjects: {finding.verdict}")
+        lines.append(
+            f"{what}: {_human(finding.measure, estimate.mean)}{interval}, {estimate.n} subjects: {finding.verdict}"
+        )
     return lines
 
 
@@ -399,7 +409,9 @@ def make_profile(done: Study) -> Profile:
         subjects=len(people),
         calibration=settings.calibration,
         recording=tuple(RecordingRow(file=r.file, sha256=r.sha256, samples=r.rows) for r in done.recordings),
-        emotion=tuple(NamedRows(name=name, change=tuple(own)) for name, own in rows.items() if name in EMOTION_CONTROLS),
+        emotion=tuple(
+            NamedRows(name=name, change=tuple(own)) for name, own in rows.items() if name in EMOTION_CONTROLS
+        ),
         state=tuple(NamedRows(name=name, change=tuple(own)) for name, own in rows.items() if name in STATES),
         unsupported=tuple(refused),
     )

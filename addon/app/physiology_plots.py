@@ -1,4 +1,7 @@
-"""The plots of a study: boxes per emotion and sex, courses around the onset of a label, correlations. Needs matplotlib, imported where it is used."""
+"""The plots of a study: boxes per emotion and sex, courses around the onset of a label, correlations.
+
+They need matplotlib, which is imported where it is used.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +94,9 @@ def _changes(done: Study) -> Any:
                 values = _plotted(key[0], np.array([c.change for c in own if (c.emotion, c.sex) == (emotion, sex)]))
                 if values.size:
                     _box(ax, i + (j - len(sexes) / 2.0) * width, values, width, COLOURS[sex])
-            finding = next((f for f in done.findings if (f.measure, f.region, f.emotion, f.group) == (*key, emotion, POOLED)), None)
+            finding = next(
+                (f for f in done.findings if (f.measure, f.region, f.emotion, f.group) == (*key, emotion, POOLED)), None
+            )
             if finding is not None and finding.estimate.low is not None:
                 e = finding.estimate
                 middle, low, high = (float(_plotted(key[0], v)) for v in (e.mean, e.low, e.high))
@@ -122,8 +127,12 @@ def _legend(figure: Any, sexes: list[str], marks: list[tuple[str, str, str]]) ->
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles = [Patch(facecolor=COLOURS[sex], alpha=0.4, edgecolor=COLOURS[sex], label=sex or "sex not stated") for sex in sexes]
-    handles += [Line2D([], [], marker=m, color="k", mfc=face, mec="k", ms=4.5, lw=1.4, label=text) for m, face, text in marks]
+    handles = [
+        Patch(facecolor=COLOURS[sex], alpha=0.4, edgecolor=COLOURS[sex], label=sex or "sex not stated") for sex in sexes
+    ]
+    handles += [
+        Line2D([], [], marker=m, color="k", mfc=face, mec="k", ms=4.5, lw=1.4, label=text) for m, face, text in marks
+    ]
     _legend_above(figure, handles)
 
 
@@ -169,7 +178,10 @@ def _courses(done: Study) -> Any:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles = [Line2D([], [], color=COLOURS[sex], lw=1.6, label=f"{sex or 'sex not stated'}: mean of subjects") for sex in sexes]
+    handles = [
+        Line2D([], [], color=COLOURS[sex], lw=1.6, label=f"{sex or 'sex not stated'}: mean of subjects")
+        for sex in sexes
+    ]
     handles += [
         Patch(facecolor="0.5", alpha=0.25, label="95 % interval of the mean"),
         Patch(facecolor="0.94", label="the label lasts"),
@@ -213,7 +225,9 @@ def _course(done: Study, key: tuple[str, str], edges: np.ndarray) -> list[tuple[
             total = np.bincount(place[inside], weights=c.value[inside], minlength=edges.size - 1)
             with np.errstate(invalid="ignore"):
                 course = total / count - base
-            found.setdefault((track.subject, track.sex, block.emotion), []).append((course, block.end_s - block.start_s))
+            found.setdefault((track.subject, track.sex, block.emotion), []).append(
+                (course, block.end_s - block.start_s)
+            )
     out = []
     for (_, sex, emotion), episodes in found.items():
         stacked = np.array([course for course, _ in episodes])

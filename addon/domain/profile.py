@@ -101,7 +101,9 @@ class Profile(Row):
     @property
     def rows(self) -> dict[tuple[str, str, str], ProfileRow]:
         """(emotion or state, region, quantity) -> row."""
-        return {(rows.name, row.region, row.quantity): row for rows in (*self.emotion, *self.state) for row in rows.change}
+        return {
+            (rows.name, row.region, row.quantity): row for rows in (*self.emotion, *self.state) for row in rows.change
+        }
 
 
 def read_profile(path: str | os.PathLike[str]) -> Profile:
@@ -129,7 +131,9 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
                 raise InputError(f"{where}: value {row.value:g} is not between low {row.low:g} and high {row.high:g}")
             low, high = room(row.region, row.quantity)
             if not low <= row.value <= high:
-                raise InputError(f"{where}: {row.value:g} is more than skin can change: keep it from {low:.4f} to {high:.4f}")
+                raise InputError(
+                    f"{where}: {row.value:g} is more than skin can change: keep it from {low:.4f} to {high:.4f}"
+                )
     return profile
 
 
@@ -210,32 +214,47 @@ def profile_rows(
         numbers = {}
         for key in ("value", "low", "high"):
             number = getattr(change, key)
-            numbers[key] = blood_change(calibration, change.measure, region, number) if quantity == "hemoglobin" else number
+            numbers[key] = (
+                blood_change(calibration, change.measure, region, number) if quantity == "hemoglobin" else number
+            )
         low, high = room(region, quantity)
         if (change.emotion, region, quantity) in taken:
             refused.append(_refusal(change, region, "not used: the analyser's index of the same region stands"))
         elif not low <= numbers["value"] <= high:
             allowed = f"({low:.4f} to {high:.4f})"
-            refused.append(_refusal(change, region, f"not used: {numbers['value']:.4g} is more than skin can change {allowed}"))
+            refused.append(
+                _refusal(change, region, f"not used: {numbers['value']:.4g} is more than skin can change {allowed}")
+            )
         else:
             taken.add((change.emotion, region, quantity))
             # An end of the interval that no skin reaches is as far as skin goes.
             numbers = {key: _rounded(min(max(number, low), high)) for key, number in numbers.items()}
-            row = ProfileRow(region=region, quantity=quantity, magnitude="measured", source=tuple(sources), note=note, **numbers)
+            row = ProfileRow(
+                region=region, quantity=quantity, magnitude="measured", source=tuple(sources), note=note, **numbers
+            )
             rows.setdefault(change.emotion, []).append(row)
 
     for change in sorted(changes, key=lambda c: ("hemoglobin_index", "perfusion", "spo2").index(c.measure)):
         if change.measure == "spo2":
             for region in ANATOMY:
-                add(change, region, "oxygenation", f"SpO2 {100 * change.value:+.2f} % points, {change.subjects} subjects")
+                add(
+                    change,
+                    region,
+                    "oxygenation",
+                    f"SpO2 {100 * change.value:+.2f} % points, {change.subjects} subjects",
+                )
             continue
         at = (change.region,) if change.region else calibration.index_region
         if change.measure == "perfusion":
             at = (calibration.oximeter,) if calibration.oximeter in ANATOMY else ()
             if not at:
-                refused.append(_refusal(change, calibration.oximeter, "not used: a finger's perfusion is not the face's"))
+                refused.append(
+                    _refusal(change, calibration.oximeter, "not used: a finger's perfusion is not the face's")
+                )
         elif not at:
-            refused.append(_refusal(change, "", "not used: the recording does not say where: a column region, or --region"))
+            refused.append(
+                _refusal(change, "", "not used: the recording does not say where: a column region, or --region")
+            )
         for region in at:
             note = f"{change.measure.replace('_', ' ')} {100 * change.value:+.1f} %, {change.subjects} subjects"
             add(change, region, "hemoglobin", note)

@@ -1,4 +1,4 @@
-"""`sanguine physiology`: the report, the profile and the plots of a synthetic study, and one line for every kind of fault."""
+"""`sanguine physiology`: report, profile and plots of a synthetic study, and one line for every kind of fault."""
 
 import dataclasses
 import json
@@ -92,7 +92,11 @@ def test_a_study_in_two_files_is_the_study(recording, tmp_path):
     """Subjects in one file each: what comes out is the same, but for the lag, which sees the same tracks."""
     lines = recording.read_text().splitlines()
     for name, own in (("a.csv", ("s01", "s02", "s03", "s04", "s05")), ("b.csv", ())):
-        rows = [line for line in lines[2:] if (line.split(",")[1] in own) == bool(own) and (own or line.split(",")[1] > "s05")]
+        rows = [
+            line
+            for line in lines[2:]
+            if (line.split(",")[1] in own) == bool(own) and (own or line.split(",")[1] > "s05")
+        ]
         (tmp_path / name).write_text("\n".join([lines[1], *rows]) + "\n")
     options = physiology.Settings(lag_s=6.0)
     whole, parts = (
@@ -164,7 +168,9 @@ def test_a_profile_needs_to_know_where_the_analyser_sat(tmp_path):
     done = physiology.study(physiology.read_recordings([path], options), options)
     with pytest.raises(InputError, match="--profile: the hemoglobin index has no region: .*--region"):
         physiology.make_profile(done)
-    there = dataclasses.replace(done, settings=physiology.Settings(calibration=Calibration(index_region=("cheeks", "nose"))))
+    there = dataclasses.replace(
+        done, settings=physiology.Settings(calibration=Calibration(index_region=("cheeks", "nose")))
+    )
     assert {region for _, region, _ in physiology.make_profile(there).rows} == {"cheeks", "nose"}
 
 
@@ -177,14 +183,22 @@ def test_a_missing_package_is_named(monkeypatch, package, plots):
 
 CELL = st.sampled_from(["", "0", "98", "50", "1e-300", "97.5", "100"])
 ROW = st.tuples(
-    st.sampled_from(["a", "b"]), st.sampled_from(["neutral", "anger", ""]), st.sampled_from([1.0, 30.0, 0.001, 3000.0]), CELL, CELL
+    st.sampled_from(["a", "b"]),
+    st.sampled_from(["neutral", "anger", ""]),
+    st.sampled_from([1.0, 30.0, 0.001, 3000.0]),
+    CELL,
+    CELL,
 )
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(ROW, max_size=60))
 def test_whatever_is_recorded_gives_a_report_or_one_line(tmp_path, rows):
-    path, time, lines = tmp_path / "any.csv", {"a": 0.0, "b": 0.0}, ["time_s,subject,sex,emotion,spo2_percent,hemoglobin_index"]
+    path, time, lines = (
+        tmp_path / "any.csv",
+        {"a": 0.0, "b": 0.0},
+        ["time_s,subject,sex,emotion,spo2_percent,hemoglobin_index"],
+    )
     for subject, emotion, step, *cells in rows:
         time[subject] += step
         lines.append(",".join([repr(time[subject]), subject, "f", emotion, *cells]))

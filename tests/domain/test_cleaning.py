@@ -12,13 +12,20 @@ from sanguine.domain.physiology.recording import Track
 def track(measure, value, step_s=1.0, emotion=None):
     time = np.arange(len(value)) * step_s
     label = np.array(["neutral"] * len(value) if emotion is None else emotion, dtype=object)
-    return Track("a.csv", "s1", "female", MEASURES[measure], "", time, label, np.array(value, float), np.arange(len(value)) + 2)
+    return Track(
+        "a.csv", "s1", "female", MEASURES[measure], "", time, label, np.array(value, float), np.arange(len(value)) + 2
+    )
 
 
 def noisy(measure, n=300, seed=0):
     """Sound samples of a resting subject."""
     random = np.random.default_rng(seed)
-    rest, sd = {"spo2": (0.975, 0.004), "pulse": (70.0, 1.5), "perfusion": (0.03, 0.002), "hemoglobin_index": (1.2, 0.02)}[measure]
+    rest, sd = {
+        "spo2": (0.975, 0.004),
+        "pulse": (70.0, 1.5),
+        "perfusion": (0.03, 0.002),
+        "hemoglobin_index": (1.2, 0.02),
+    }[measure]
     return rest + sd * random.standard_normal(n)
 
 
@@ -124,9 +131,7 @@ def test_windows_count_alike_however_many_samples_they_have():
     """Ten samples in the first window, two in the second: the level is the mean of the windows."""
     time = np.concatenate([np.arange(10) * 0.5, [5.0, 7.5]])
     value = np.concatenate([np.full(10, 70.0), [76.0, 76.0]])
-    t = dataclasses.replace(
-        track("pulse", value), time_s=time, emotion=np.array(["anger"] * 12, dtype=object)
-    )
+    t = dataclasses.replace(track("pulse", value), time_s=time, emotion=np.array(["anger"] * 12, dtype=object))
     (level,) = levels(clean(t), 0.0, Settling(0.0, 0.0, 5.0))
     assert level.value == pytest.approx(73.0)
 

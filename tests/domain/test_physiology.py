@@ -185,7 +185,9 @@ def test_the_textbook_values():
     b = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0])
     paired = st.mean_interval(a - b)
     assert (paired.t, paired.low, paired.high) == pytest.approx((4.0621, 0.7001, 2.4599), abs=1e-4)
-    assert paired.p == pytest.approx(0.002833, abs=1e-6) and st.paired_effect(paired)[0].value == pytest.approx(1.2846, abs=1e-4)
+    assert paired.p == pytest.approx(0.002833, abs=1e-6) and st.paired_effect(paired)[0].value == pytest.approx(
+        1.2846, abs=1e-4
+    )
     welch = st.difference_interval(a, b)
     assert (welch.t, welch.df, welch.p) == pytest.approx((1.8608, 17.776, 0.07939), abs=1e-3)
     assert (welch.low, welch.high) == pytest.approx((-0.2055, 3.3655), abs=1e-4)
@@ -218,7 +220,9 @@ def test_pairs_of_measures_share_their_subjects():
         for emotion, size in (("anger", 1.0), ("fear", -1.0)):
             changes += [
                 SubjectChange(f"s{k}", "", "pulse", "", emotion, 8.0 * size + random.standard_normal(), 70.0),
-                SubjectChange(f"s{k}", "", HEMOGLOBIN, "cheeks", emotion, 0.2 * size + 0.02 * random.standard_normal(), 0.0),
+                SubjectChange(
+                    f"s{k}", "", HEMOGLOBIN, "cheeks", emotion, 0.2 * size + 0.02 * random.standard_normal(), 0.0
+                ),
                 SubjectChange(f"s{k}", "", HEMOGLOBIN, "nose", emotion, 0.1 * random.standard_normal(), 0.0),
             ]
     found = {(pair.measures, pair.region): pair for pair in pair_findings(changes)}
@@ -245,7 +249,13 @@ def test_a_rest_that_is_too_short_is_told():
 
 def test_a_drift_cancels_between_two_rests():
     signal = Signal(0.0, 0.0, 1e-4, drift=0.05, rise_s=0.0, fall_s=0.0)
-    design = Design(women=3, men=0, emotions=("anger",), signals={HEMOGLOBIN: signal}, answers={(HEMOGLOBIN, "anger"): Answer(0.2, 0.2, 0.0, 0.0)})
+    design = Design(
+        women=3,
+        men=0,
+        emotions=("anger",),
+        signals={HEMOGLOBIN: signal},
+        answers={(HEMOGLOBIN, "anger"): Answer(0.2, 0.2, 0.0, 0.0)},
+    )
     changes = analyse(simulate(design, 8))
     # Against the first rest alone it would be 0.05 more. Means of 20 samples of noise 1e-4 are good to 2e-5 or so.
     np.testing.assert_allclose([change.change for change in changes], 0.2, atol=2e-4)

@@ -40,14 +40,18 @@ def test_a_profile_comes_back(tmp_path):
     written = profile(rows, refused, file)
     write_profile(tmp_path / "p.toml", written)
     assert read_profile(tmp_path / "p.toml") == written
-    assert written.rows["anger", "cheeks", "hemoglobin"].value == pytest.approx(0.3 * 0.014 * ANATOMY["cheeks"].hemoglobin, rel=1e-3)
+    assert written.rows["anger", "cheeks", "hemoglobin"].value == pytest.approx(
+        0.3 * 0.014 * ANATOMY["cheeks"].hemoglobin, rel=1e-3
+    )
     assert {region for emotion, region, quantity in written.rows if emotion == "sad"} == set(ANATOMY)
     assert written.rows["sad", "lips", "oxygenation"].low == -0.015
 
 
 def test_states_have_rows_too(tmp_path, monkeypatch):
     monkeypatch.setattr("sanguine.domain.profile.STATES", {"exertion": "…"})
-    rows, _ = profile_rows([Measured("exertion", "hemoglobin_index", "nose", 9, 0.2, 0.1, 0.3)], Calibration(), ["a.csv"])
+    rows, _ = profile_rows(
+        [Measured("exertion", "hemoglobin_index", "nose", 9, 0.2, 0.1, 0.3)], Calibration(), ["a.csv"]
+    )
     written = profile({}).model_copy(update={"state": (NamedRows(name="exertion", change=tuple(rows["exertion"])),)})
     write_profile(tmp_path / "p.toml", written)
     assert read_profile(tmp_path / "p.toml") == written and ("exertion", "nose", "hemoglobin") in written.rows
@@ -84,7 +88,8 @@ def test_an_erythema_index_is_turned_by_the_optics():
         calibration = Calibration(index="erythema", melanin=melanin)
         rest = at_rest("cheeks", "hemoglobin")
         skins = [
-            default_skin() | {"melanin": melanin * ANATOMY["cheeks"].melanin, "hemoglobin": f, "oxygenation": 0.72, "oil": 0.0}
+            default_skin()
+            | {"melanin": melanin * ANATOMY["cheeks"].melanin, "hemoglobin": f, "oxygenation": 0.72, "oil": 0.0}
             for f in (rest, 1.5 * rest, 0.7 * rest)
         ]
         green, red = sanguine_core.reflectance(skin_rows(skins), np.array([568.0, 660.0])).T
@@ -92,14 +97,18 @@ def test_an_erythema_index_is_turned_by_the_optics():
         for k, factor in ((1, 1.5), (2, 0.7)):
             relative = index[k] / index[0] - 1.0
             # Linear between 200 blood contents 4 % apart, of a curve that bends by less than that: a part in a thousand.
-            assert blood_change(calibration, "hemoglobin_index", "cheeks", relative) == pytest.approx((factor - 1.0) * rest, rel=5e-3)
+            assert blood_change(calibration, "hemoglobin_index", "cheeks", relative) == pytest.approx(
+                (factor - 1.0) * rest, rel=5e-3
+            )
             assert abs(relative) < abs(factor - 1.0) / 2.0
         assert blood_change(calibration, "perfusion", "cheeks", 0.1) == pytest.approx(0.1 * rest)
         assert blood_change(calibration, "hemoglobin_index", "cheeks", -0.99) == -np.inf
 
 
 def test_more_than_skin_can_change_is_left_out():
-    rows, refused = profile_rows([Measured("anger", "hemoglobin_index", "cheeks", 9, 6.0, 5.0, 7.0)], Calibration(), ["a.csv"])
+    rows, refused = profile_rows(
+        [Measured("anger", "hemoglobin_index", "cheeks", 9, 6.0, 5.0, 7.0)], Calibration(), ["a.csv"]
+    )
     assert not rows and "more than skin can change" in refused[0].verdict
     for region in ANATOMY:
         for quantity in ("hemoglobin", "oxygenation"):

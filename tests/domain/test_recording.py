@@ -123,7 +123,9 @@ def test_two_readings_of_one_sensor_at_one_time_must_agree(tmp_path):
 
 LINES = st.lists(
     st.one_of(
-        st.sampled_from([HEADER, "0,s1,f,neutral,98,70", "1e300,s1,f,anger,98,70", "9,s2,m,anger,0,0", "# x", '"', "5,s1,f,,,"]),
+        st.sampled_from(
+            [HEADER, "0,s1,f,neutral,98,70", "1e300,s1,f,anger,98,70", "9,s2,m,anger,0,0", "# x", '"', "5,s1,f,,,"]
+        ),
         st.text(alphabet='time_sub,0123456789.\n"e-+x \x00\u00e9\u2028;', max_size=40),
     ),
     max_size=8,

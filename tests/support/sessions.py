@@ -139,7 +139,11 @@ def write_csv(path: Path, recording: Recording, comment: str = "") -> None:
     names = [track.measure.id for track in next(iter(subjects.values()))]
     region = any(track.region for track in recording.tracks)
     lines = [f"# {line}" for line in comment.splitlines()]
-    lines.append(",".join(["time_s", "subject", "sex", "emotion", *(["region"] if region else []), *(COLUMNS[n][0] for n in names)]))
+    lines.append(
+        ",".join(
+            ["time_s", "subject", "sex", "emotion", *(["region"] if region else []), *(COLUMNS[n][0] for n in names)]
+        )
+    )
     for own in subjects.values():
         where = next((track.region for track in own if track.region), "")
         for k, time in enumerate(own[0].time_s):

@@ -212,7 +212,9 @@ def pair_findings(changes: Sequence[SubjectChange]) -> list[PairFinding]:
             result = st.common_correlation(subject, x, y)
             if result is not None:
                 region = analyser[0][1] if analyser else ""
-                found.append(PairFinding((first[0], second[0]), region, len(set(subject)), result[1], result[0], result[2]))
+                found.append(
+                    PairFinding((first[0], second[0]), region, len(set(subject)), result[1], result[0], result[2])
+                )
     adjusted = st.holm([finding.p for finding in found])
     return [
         replace(finding, p_holm=p, verdict=_verdict(finding.subjects, p, finding.p, len(found)))

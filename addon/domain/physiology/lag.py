@@ -51,7 +51,7 @@ def estimate_lag(tracks: Sequence[Clean]) -> Lag:
     grid = np.arange(-_BEFORE_S, _AFTER_S + step / 2, step)
     for cleaned in tracks:
         found = blocks(cleaned.track)
-        for before, block in zip(found, found[1:]):
+        for before, block in zip(found, found[1:], strict=False):
             if block.emotion == NEUTRAL or before.emotion != NEUTRAL or before.end_s != block.start_s:
                 continue
             if min(before.end_s - before.start_s, block.end_s - block.start_s) < _LEAST_S:
@@ -71,7 +71,9 @@ def estimate_lag(tracks: Sequence[Clean]) -> Lag:
         return Lag(None, None, None, len(onsets))
 
     lags = np.arange(0.0, MAX_LAG_S + step / 2, step)
-    cost = np.array([_cost(np.array(onsets), _rises(grid, lags, rise, step)) for rise in _RISE_S])  # (rises, onsets, lags)
+    cost = np.array(
+        [_cost(np.array(onsets), _rises(grid, lags, rise, step)) for rise in _RISE_S]
+    )  # (rises, onsets, lags)
     by_subject = np.zeros((len(names), *cost.shape[::2]))  # (subjects, rises, lags)
     np.add.at(by_subject, who, cost.transpose(1, 0, 2))
     random = np.random.default_rng(0)

@@ -100,6 +100,7 @@ def read_recording(
     if len(rows) == 1:
         raise InputError(f"{path}: line {header_line}: no samples below the header")
 
+    time_column = header[layout.time].strip()
     words = {name: name for name in emotions} | {name.lower(): emotion for name, emotion in (labels or {}).items()}
     people: dict[str, tuple[str, int]] = {}
     groups: dict[tuple[str, str], _Rows] = {}
@@ -108,14 +109,16 @@ def read_recording(
         if len(row) != len(header):
             raise InputError(f"{where}: {len(row)} cells, the header has {len(header)}")
         subject = _name(f"{where}: subject", row[layout.subject])
-        sex = _sex(where, subject, row[layout.sex].strip().lower(), line, people)
+        _check_sex(where, subject, row[layout.sex].strip().lower(), line, people)
         region = "" if layout.region is None else row[layout.region].strip()
         if region and region not in regions:
             raise InputError(f"{where}: region: {_show(region)} is none, {nearest(region[:_MAX_NAME], regions)}")
         group = groups.setdefault((subject, region), _Rows(len(layout.measures)))
-        time = _number(f"{where}: {header[layout.time].strip()}", row[layout.time], "every sample needs one") * layout.seconds
+        time = _number(f"{where}: {time_column}", row[layout.time], "every sample needs one") * layout.seconds
         if group.time and time <= group.time[-1]:
-            raise InputError(_out_of_order(where, header[layout.time].strip(), row[layout.time].strip(), time, group, subject, region))
+            raise InputError(
+                _out_of_order(f"{where}: {time_column}", row[layout.time].strip(), time, group, subject, region)
+            )
         label = row[layout.emotion].strip().lower()
         if label and label not in words:
             raise InputError(
@@ -126,7 +129,7 @@ def read_recording(
         group.line.append(line)
         for (column, name), values in zip(layout.measures, group.values, strict=True):
             values.append(_value(where, name, row[column]))
-    _check_time(path, header[layout.time].strip(), groups)
+    _check_time(path, time_column, groups)
     _check_units(path, layout, groups)
     return Recording(
         _file_name(path),
@@ -184,7 +187,9 @@ def _layout(where: str, header: list[str], ignore: Sequence[str]) -> _Layout:
         if name in COLUMNS:
             measure = COLUMNS[name][0].id
             if measure in measures:
-                raise InputError(f"{where}: columns {measures[measure]!r} and {name!r} are the same measure: remove one")
+                raise InputError(
+                    f"{where}: columns {measures[measure]!r} and {name!r} are the same measure: remove one"
+                )
             measures[measure] = name
         found[name] = k
     times = [name for name in TIME_COLUMNS if name in found]
@@ -210,7 +215,8 @@ def _name(where: str, cell: str) -> str:
     return name
 
 
-def _sex(where: str, subject: str, cell: str, line: int, people: dict[str, tuple[str, int]]) -> str:
+def _check_sex(where: str, subject: str, cell: str, line: int, people: dict[str, tuple[str, int]]) -> None:
+    """Notes the sex of a new subject in `people` (name -> sex and line), and compares it for a known one."""
     if cell not in SEXES:
         raise InputError(f"{where}: sex: {_show(cell)} is not female, male, f, m or empty")
     sex = SEXES[cell]
@@ -219,7 +225,6 @@ def _sex(where: str, subject: str, cell: str, line: int, people: dict[str, tuple
         raise InputError(
             f"{where}: sex: {sex or 'empty'}, but {_show(subject)} is {before or 'empty'} on line {first}: one subject has one"
         )
-    return sex
 
 
 def _number(where: str, cell: str, empty: str) -> float:
@@ -253,25 +258,31 @@ def _value(where: str, name: str, cell: str) -> float:
     return value * unit.factor
 
 
-def _out_of_order(where: str, column: str, cell: str, time: float, group: _Rows, subject: str, region: str) -> str:
+def _out_of_order(where: str, cell: str, time: float, group: _Rows, subject: str, region: str) -> str:
     whose = f"of {_show(subject)}" + (f" at {region}" if region else "")
     k = int(np.searchsorted(group.time, time))
     if k < len(group.time) and group.time[k] == time:
-        return f"{where}: {column}: {_show(cell)} {whose} stands on line {group.line[k]} already: remove one of the two samples"
-    return f"{where}: {column}: {_show(cell)} {whose} after a later time on line {group.line[-1]}: sort the samples by time"
+        return f"{where}: {_show(cell)} {whose} stands on line {group.line[k]} already: remove one of the two samples"
+    return f"{where}: {_show(cell)} {whose} after a later time on line {group.line[-1]}: sort the samples by time"
 
 
 def _check_time(path: object, column: str, groups: Mapping[tuple[str, str], _Rows]) -> None:
     spans = {who: group.time[-1] - group.time[0] for (who, _), group in groups.items()}
     subject, longest = max(spans.items(), key=lambda item: item[1])
     if longest > _LONGEST_S:
-        hint = "this looks like milliseconds: call the column time_ms" if column == "time_s" else "call the column by its unit"
+        hint = (
+            "this looks like milliseconds: call the column time_ms"
+            if column == "time_s"
+            else "call the column by its unit"
+        )
         raise InputError(
             f"{path}: {column}: the samples of {_show(subject)} span {longest / 3600.0:.0f} hours: {hint} (or give each "
             "session a file)"
         )
     if column == "time_ms" and longest < _SHORTEST_S:
-        raise InputError(f"{path}: {column}: no subject has more than {longest:g} s: this looks like seconds: call the column time_s")
+        raise InputError(
+            f"{path}: {column}: no subject has more than {longest:g} s: this looks like seconds: call the column time_s"
+        )
 
 
 def _check_units(path: object, layout: _Layout, groups: Mapping[tuple[str, str], _Rows]) -> None:
@@ -309,7 +320,9 @@ def _tracks(
                     values = np.array(group.values[k])
                     if np.isfinite(values).any():
                         where = region if measure.device == "analyser" else ""
-                        tracks.append(Track(file, subject, sex, measure, where, *arrays[region][:2], values, arrays[region][2]))
+                        tracks.append(
+                            Track(file, subject, sex, measure, where, *arrays[region][:2], values, arrays[region][2])
+                        )
                 continue
             # One sensor, whose readings stand beside those of every region that the analyser visits.
             merged = [np.concatenate([arrays[region][part] for region in own]) for part in range(3)]
