@@ -254,15 +254,16 @@ def read_blood(
                 channel = drives.setdefault((row.region, row.quantity), {})
                 if group.name in channel:
                     raise InputError(f"{where}: given twice, remove one")
-                kinetics = row.kinetics or group.kinetics or _usual_kinetics(row)
+                kinetics = row.kinetics or group.kinetics or usual_kinetics(row.quantity, row.value)
                 channel[group.name] = Drive(group.name, row.value, kinetics)
     return replace(blood, drives={key: tuple(channel.values()) for key, channel in drives.items()})
 
 
-def _usual_kinetics(row: ChangeRow) -> str:
-    if row.quantity == "oxygenation":
+def usual_kinetics(quantity: str, value: float) -> str:
+    """The time course of a change that has none of its own."""
+    if quantity == "oxygenation":
         return "oxygenation"
-    return "dilation" if row.value >= 0.0 else "constriction"
+    return "dilation" if value >= 0.0 else "constriction"
 
 
 def _check_source(sources: tuple[str, ...], evidence: Mapping[str, Evidence], where: str) -> None:

@@ -1,7 +1,7 @@
 """An emotion profile: changes of blood that were measured in people, as `sanguine physiology` writes them.
 
-Its rows are those of rigs/blood.toml, with the interval beside the value. A rig that reads a profile takes its rows in
-place of the table's for the same emotion or state, region and quantity; what the profile does not have stays as it is.
+Its rows are those of rigs/blood.toml, with the interval beside the value. `with_profile` puts them in; what the profile
+does not have stays as it is.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Literal
 
@@ -18,7 +18,18 @@ import numpy as np
 import sanguine_core
 from pydantic import Field
 
-from .blood import ANATOMY, BLOOD_CONTROL_MAX, STATES, Quantity, Reference, Rest, Sources
+from .blood import (
+    ANATOMY,
+    BLOOD,
+    ELSEWHERE,
+    STATES,
+    Blood,
+    Drive,
+    Quantity,
+    Rest,
+    Sources,
+    usual_kinetics,
+)
 from .errors import InputError, nearest
 from .facs import EMOTION_CONTROLS
 from .files import atomic, read_toml, validate
@@ -119,8 +130,8 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
             raise InputError(f"{path}: {kind}: {rows.name}: no such {kind}, {nearest(rows.name, known)}")
         for row in rows.change:
             where = f"{path}: {rows.name} {row.region} {row.quantity}"
-            if row.region not in ANATOMY:
-                raise InputError(f"{where}: no such region, {nearest(row.region, ANATOMY)}")
+            if row.region not in (*ANATOMY, ELSEWHERE):
+                raise InputError(f"{where}: no such region, {nearest(row.region, (*ANATOMY, ELSEWHERE))}")
             if (rows.name, row.region, row.quantity) in seen:
                 raise InputError(f"{where}: given twice, remove one")
             seen.add((rows.name, row.region, row.quantity))
@@ -129,7 +140,7 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
                     raise InputError(f"{where}: source: {source}: not among the recordings, {nearest(source, files)}")
             if not row.low <= row.value <= row.high:
                 raise InputError(f"{where}: value {row.value:g} is not between low {row.low:g} and high {row.high:g}")
-            low, high = room(row.region, row.quantity)
+            low, high = BLOOD.room(row.region, row.quantity)
             if not low <= row.value <= high:
                 raise InputError(
                     f"{where}: {row.value:g} is more than skin can change: keep it from {low:.4f} to {high:.4f}"
@@ -137,23 +148,22 @@ def read_profile(path: str | os.PathLike[str]) -> Profile:
     return profile
 
 
-@lru_cache(maxsize=1)
-def _reference() -> Reference:
-    return validate(Reference, read_toml(rigs_path("blood.toml"))["reference"], rigs_path("blood.toml"))
+def with_profile(blood: Blood, profile: Profile) -> Blood:
+    """`blood` as it was measured: hemoglobin in place of the table's, oxygenation on top of it.
 
-
-def at_rest(region: str, quantity: str) -> float:
-    """The reference skin's own value in a region."""
-    rest = ANATOMY.get(region, Rest())
-    if quantity == "hemoglobin":
-        return _reference().hemoglobin * rest.hemoglobin
-    return _reference().oxygenation + rest.oxygenation
-
-
-def room(region: str, quantity: str) -> tuple[float, float]:
-    """How far the reference skin may change so that the slider's full exaggeration stays within its limits."""
-    limits = getattr(_reference(), f"{quantity}_limits")
-    return tuple((limit - at_rest(region, quantity)) / BLOOD_CONTROL_MAX for limit in limits)
+    What an oximeter measures is arterial, and adds to whatever the tissue takes out. A drive keeps its time course while it
+    keeps its direction.
+    """
+    drives = {key: {drive.control: drive for drive in own} for key, own in blood.drives.items()}
+    for (control, region, quantity), row in profile.rows.items():
+        own = drives.setdefault((region, quantity), {})
+        before = own.get(control)
+        low, high = blood.room(region, quantity)
+        value = row.value + (before.value if before and quantity == "oxygenation" else 0.0)
+        value = min(max(value, low), high)
+        keeps = before is not None and before.value * value > 0.0
+        own[control] = Drive(control, value, before.kinetics if keeps else usual_kinetics(quantity, value))
+    return replace(blood, drives={key: tuple(own.values()) for key, own in drives.items()})
 
 
 @dataclass(frozen=True)
@@ -169,9 +179,9 @@ class Measured:
     high: float
 
 
-def blood_change(calibration: Calibration, measure: str, region: str, relative: float) -> float:
+def blood_of_index(calibration: Calibration, measure: str, region: str, relative: float) -> float:
     """Change of the blood volume fraction that a relative change of an index stands for; infinite where no blood gives it."""
-    rest = at_rest(region, "hemoglobin")
+    rest = BLOOD.at_rest(region, "hemoglobin")
     if measure != "hemoglobin_index" or calibration.index == "linear":
         return calibration.index_gain * rest * relative
     blood, index = _erythema(calibration.melanin, region)
@@ -187,7 +197,7 @@ def _erythema(melanin: float, region: str) -> tuple[np.ndarray, np.ndarray]:
     blood = np.geomspace(1e-4, PARAMETERS["hemoglobin"].hard_max, 200)
     skin = default_skin() | {
         "melanin": min(melanin * rest.melanin, PARAMETERS["melanin"].hard_max),
-        "oxygenation": at_rest(region, "oxygenation"),
+        "oxygenation": BLOOD.at_rest(region, "oxygenation"),
         "oil": 0.0,
     }
     rows = skin_rows([skin | {"hemoglobin": fraction} for fraction in blood])
@@ -215,9 +225,9 @@ def profile_rows(
         for key in ("value", "low", "high"):
             number = getattr(change, key)
             numbers[key] = (
-                blood_change(calibration, change.measure, region, number) if quantity == "hemoglobin" else number
+                blood_of_index(calibration, change.measure, region, number) if quantity == "hemoglobin" else number
             )
-        low, high = room(region, quantity)
+        low, high = BLOOD.room(region, quantity)
         if (change.emotion, region, quantity) in taken:
             refused.append(_refusal(change, region, "not used: the analyser's index of the same region stands"))
         elif not low <= numbers["value"] <= high:
@@ -236,7 +246,7 @@ def profile_rows(
 
     for change in sorted(changes, key=lambda c: ("hemoglobin_index", "perfusion", "spo2").index(c.measure)):
         if change.measure == "spo2":
-            for region in ANATOMY:
+            for region in (*ANATOMY, ELSEWHERE):
                 add(
                     change,
                     region,
@@ -273,8 +283,8 @@ def _rounded(value: float) -> float:
 def write_profile(path: str | os.PathLike[str], profile: Profile) -> None:
     """Whole or not at all."""
     lines = [
-        "# Changes of blood that were measured, written by `sanguine physiology`; read in place of the same rows of",
-        "# rigs/blood.toml. low and high are 95 % intervals. docs/physiology.md says how indices became units.",
+        "# Changes of blood that were measured, written by `sanguine physiology`; for those of rigs/blood.toml.",
+        "# low and high are 95 % intervals. docs/physiology.md says how indices became units, and what they replace.",
         f"format = {profile.format}",
         f"sanguine = {_text(profile.sanguine)}",
         f"sex = {_text(profile.sex)}",

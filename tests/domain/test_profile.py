@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 import sanguine_core
-from sanguine.domain.blood import ANATOMY
+from sanguine.domain.blood import ANATOMY, BLOOD, ELSEWHERE, settled
 from sanguine.domain.errors import InputError
 from sanguine.domain.parameters import default_skin, skin_rows
 from sanguine.domain.profile import (
@@ -14,11 +14,10 @@ from sanguine.domain.profile import (
     NamedRows,
     Profile,
     RecordingRow,
-    at_rest,
-    blood_change,
+    blood_of_index,
     profile_rows,
     read_profile,
-    room,
+    with_profile,
     write_profile,
 )
 
@@ -43,7 +42,7 @@ def test_a_profile_comes_back(tmp_path):
     assert written.rows["anger", "cheeks", "hemoglobin"].value == pytest.approx(
         0.3 * 0.014 * ANATOMY["cheeks"].hemoglobin, rel=1e-3
     )
-    assert {region for emotion, region, quantity in written.rows if emotion == "sad"} == set(ANATOMY)
+    assert {region for emotion, region, quantity in written.rows if emotion == "sad"} == {*ANATOMY, ELSEWHERE}
     assert written.rows["sad", "lips", "oxygenation"].low == -0.015
 
 
@@ -65,7 +64,7 @@ def test_an_index_becomes_blood_by_its_gain_where_it_was_taken():
     rows, refused = profile_rows([nowhere], Calibration(index_gain=2.0, index_region=("cheeks", "lips")), ["a.csv"])
     assert not refused and [row.region for row in rows["fear"]] == ["cheeks", "lips"]
     for row in rows["fear"]:
-        rest = at_rest(row.region, "hemoglobin")
+        rest = BLOOD.at_rest(row.region, "hemoglobin")
         assert (row.value, row.low, row.high) == pytest.approx((-0.2 * rest, -0.3 * rest, -0.1 * rest), rel=1e-3)
     rows, refused = profile_rows([nowhere], Calibration(index_gain=2.0), ["a.csv"])
     assert not rows and "where" in refused[0].verdict
@@ -86,7 +85,7 @@ def test_an_erythema_index_is_turned_by_the_optics():
     """The index of the model's own skin gives back its blood; its relative change is a third of the blood's or less."""
     for melanin in (0.018, 0.1):
         calibration = Calibration(index="erythema", melanin=melanin)
-        rest = at_rest("cheeks", "hemoglobin")
+        rest = BLOOD.at_rest("cheeks", "hemoglobin")
         skins = [
             default_skin()
             | {"melanin": melanin * ANATOMY["cheeks"].melanin, "hemoglobin": f, "oxygenation": 0.72, "oil": 0.0}
@@ -97,12 +96,12 @@ def test_an_erythema_index_is_turned_by_the_optics():
         for k, factor in ((1, 1.5), (2, 0.7)):
             relative = index[k] / index[0] - 1.0
             # Linear between 200 blood contents 4 % apart, of a curve that bends by less than that: a part in a thousand.
-            assert blood_change(calibration, "hemoglobin_index", "cheeks", relative) == pytest.approx(
+            assert blood_of_index(calibration, "hemoglobin_index", "cheeks", relative) == pytest.approx(
                 (factor - 1.0) * rest, rel=5e-3
             )
             assert abs(relative) < abs(factor - 1.0) / 2.0
-        assert blood_change(calibration, "perfusion", "cheeks", 0.1) == pytest.approx(0.1 * rest)
-        assert blood_change(calibration, "hemoglobin_index", "cheeks", -0.99) == -np.inf
+        assert blood_of_index(calibration, "perfusion", "cheeks", 0.1) == pytest.approx(0.1 * rest)
+        assert blood_of_index(calibration, "hemoglobin_index", "cheeks", -0.99) == -np.inf
 
 
 def test_more_than_skin_can_change_is_left_out():
@@ -112,8 +111,30 @@ def test_more_than_skin_can_change_is_left_out():
     assert not rows and "more than skin can change" in refused[0].verdict
     for region in ANATOMY:
         for quantity in ("hemoglobin", "oxygenation"):
-            low, high = room(region, quantity)
-            assert low < 0.0 < high and at_rest(region, quantity) + low > 0.0
+            low, high = BLOOD.room(region, quantity)
+            assert low < 0.0 < high and BLOOD.at_rest(region, quantity) + low > 0.0
+
+
+def test_blood_with_a_profile():
+    """Hemoglobin is the measured one, oxygenation the table's and the arterial part, all else as it was."""
+    sad = Measured("sad", "spo2", "", 9, -0.01, -0.015, -0.005)
+    pale = Measured("happy", "hemoglobin_index", "cheeks", 9, -0.2, -0.3, -0.1)
+    measured = with_profile(BLOOD, profile(profile_rows([ANGER, sad, pale], Calibration(), ["a.csv"])[0]))
+    for controls in ({"anger": 1.0}, {"sad": 1.0}, {"happy": 0.5}, {"fear": 1.0}):
+        before, after = settled(controls), settled(controls, blood=measured)
+        for key in before.keys() | after.keys():
+            expected = before.get(key, 0.0)
+            if controls == {"anger": 1.0} and key == ("cheeks", "hemoglobin"):
+                expected = 0.3 * BLOOD.at_rest(*key)
+            elif controls == {"happy": 0.5} and key == ("cheeks", "hemoglobin"):
+                expected = -0.1 * BLOOD.at_rest(*key)
+            elif controls == {"sad": 1.0} and key[1] == "oxygenation":
+                expected -= 0.01
+            assert after.get(key, 0.0) == pytest.approx(expected, rel=1e-3), (controls, key)
+    table, drives = ({d.control: d for d in blood.drives["cheeks", "hemoglobin"]} for blood in (BLOOD, measured))
+    assert drives["anger"].kinetics == table["anger"].kinetics  # still a flush
+    assert table["happy"].kinetics != drives["happy"].kinetics == "constriction"
+    assert with_profile(BLOOD, profile({})) == BLOOD
 
 
 @pytest.mark.parametrize(
