@@ -9,18 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from ..domain.blood import MOOD_SUFFIX
 from ..domain.capture_curves import frame_count, reduce_keys, resample, smooth
-from ..domain.capture_emotion import SUFFIX, UNREADABLE, infer_emotions
+from ..domain.capture_emotion import UNREADABLE, infer_emotions
 from ..domain.capture_files import Take, read_take
 from ..domain.capture_units import units_of_gaze, units_of_head, units_of_keys
 from ..domain.errors import InputError, nearest
-from ..domain.facs import ARKIT, DEFAULT_EMOTIONS, EMOTION_CONTROLS
+from ..domain.facs import ARKIT, DEFAULT_EMOTIONS, EMOTION_CONTROLS, shape_key_values
 
 MIN_FPS, MAX_FPS = 1.0, 240.0
 MAX_SMOOTH_S = 2.0
 MAX_FRAMES = 500_000
 _STILL = 0.01  # a control that never gets this far gets no curve
-_WORTH_SAYING = 0.05  # root mean square that a key leaves unfollowed
+_RESIDUAL_FRAMES = 500
+_WORTH_SAYING = 0.1  # root mean square that a key leaves unfollowed
 
 
 @dataclass
@@ -31,7 +33,8 @@ class Performance:
     controls    : 'AU12L' …, 'anger_blood' … -> (frame (K,), value (K,)); the rest of the controls stays at 0
     head_deg    : 'yaw', 'pitch', 'roll' -> the same, degrees from the head's median: to the subject's left, up, onto
                   the left shoulder. Units 51 to 56 hold the same, as far as the rig's head goes
-    residual    : key -> {"rms", "max"} of what the units cannot follow, recorded less followed
+    residual    : key -> {"rms", "max"} of what the rig does not follow, with all its clamps and fades, on up to 500
+                  recorded frames
     peak_error  : largest loss of a control's highest value by resampling and reduction, as a share of that value
     notes       : what was found in and done to the data, one line each
     """
@@ -51,9 +54,9 @@ class Performance:
     def emotions(self) -> dict[str, float]:
         """Highest level of each emotion that was inferred."""
         return {
-            name.removesuffix(SUFFIX): float(values.max())
+            name.removesuffix(MOOD_SUFFIX): float(values.max())
             for name, (_, values) in self.controls.items()
-            if name.endswith(SUFFIX)
+            if name.endswith(MOOD_SUFFIX)
         }
 
 
@@ -86,8 +89,9 @@ def capture(
         if name not in EMOTION_CONTROLS:
             raise InputError(f"--emotions: {name}: no such emotion, {nearest(name, EMOTION_CONTROLS)}")
     take = read_take(path, source_fps)
-    if frame_count(take.seconds, fps) > MAX_FRAMES:
-        raise InputError(f"{path}: {take.seconds[-1]:.0f} s at {fps:g} frames a second are more than {MAX_FRAMES} frames")
+    for rate in (fps, take.fps):
+        if frame_count(take.seconds, rate) > MAX_FRAMES:
+            raise InputError(f"{path}: {take.seconds[-1]:.0f} s at {rate:g} frames a second are more than {MAX_FRAMES} frames")
     return perform(take, fps, smooth_s, emotions, reduce, head)
 
 
@@ -106,7 +110,7 @@ def perform(
     if take.keys:
         followed = units_of_keys(take.keys)
         units, shown = followed.controls, followed.shown
-        residual = _residual(followed.residual, notes)
+        residual = _residual(take, units, notes)
     else:
         units = {f"AU{unit}": values for unit, values in take.units.items()}
         shown, residual = units, {}
@@ -115,7 +119,7 @@ def perform(
     levels = infer_emotions(take.seconds, shown, emotions)
     notes += [f"{name}: not inferred, {UNREADABLE[name]}" for name in emotions if name in UNREADABLE]
     curves = {name: values for name, values in units.items() if values.max() >= _STILL}
-    curves |= {name + SUFFIX: values for name, values in levels.items() if values.max() >= _STILL}
+    curves |= {name + MOOD_SUFFIX: values for name, values in levels.items() if values.max() >= _STILL}
 
     controls, peak_error = {}, 0.0
     for name, values in curves.items():
@@ -144,13 +148,17 @@ def _keys(seconds: np.ndarray, values: np.ndarray, fps: float, reduce: float) ->
     return frames, at_frames[frames]
 
 
-def _residual(left: dict[str, np.ndarray], notes: list[str]) -> dict[str, dict[str, float]]:
-    found = {
-        key: {"rms": float(np.sqrt(np.mean(values**2))), "max": float(np.abs(values).max())} for key, values in left.items()
-    }
+def _residual(take: Take, units: dict[str, np.ndarray], notes: list[str]) -> dict[str, dict[str, float]]:
+    some = np.unique(np.linspace(0, len(take.seconds) - 1, _RESIDUAL_FRAMES).astype(int))
+    faces = [shape_key_values({name: float(values[i]) for name, values in units.items()}) for i in some]
+    found = {}
+    for key in ARKIT.keys:
+        recorded = take.keys[key][some] if key in take.keys else np.zeros(len(some))
+        off = recorded - [face.get(key, 0.0) for face in faces]
+        found[key] = {"rms": float(np.sqrt(np.mean(off**2))), "max": float(np.abs(off).max())}
     for key, size in found.items():
         if size["rms"] > _WORTH_SAYING and key not in ARKIT.unreached:
-            notes.append(f"{key}: the units leave {size['rms']:.2f} of it unfollowed (rms), {size['max']:.2f} at most")
+            notes.append(f"{key}: the rig is off by {size['rms']:.2f} (rms), {size['max']:.2f} at most")
         elif key in ARKIT.unreached and size["max"] > _WORTH_SAYING:
             notes.append(f"{key}: recorded up to {size['max']:.2f}, no unit drives it: {ARKIT.unreached[key]}")
     return found

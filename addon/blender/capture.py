@@ -11,10 +11,11 @@ import time
 import bpy
 
 from ..app.capture import Performance, capture
-from ..domain.capture_emotion import SUFFIX
+from ..domain.blood import MOOD_SUFFIX
 from ..domain.errors import InputError
-from ..domain.facs import EMOTION_MAX
-from .controls import CONTROL_BONE, add_controls, describe, emotions_of
+from .bake import RECORD
+from .blood import blood_properties, drive_settled
+from .controls import CONTROL_BONE, add_controls, emotions_of
 from .curves import action_curve, ensure_action, set_keys
 from .operators import active_face, controls_of, emotion_bone
 
@@ -42,14 +43,13 @@ def import_performance(rig: bpy.types.Object, performance: Performance, start: i
 
 
 def _add_sliders(rig: bpy.types.Object, performance: Performance) -> None:
-    """Sides of units, and the blood of inferred emotions without their muscles."""
-    bone = add_controls(rig, emotions_of(rig))
-    for name in performance.controls:
-        if name.endswith(SUFFIX) and name not in bone:
-            bone[name] = 0.0
-            emotion = name.removesuffix(SUFFIX)
-            describe(bone, name, f"The blood of {emotion}, without its muscles", 0.0, EMOTION_MAX, 0.0, 1.0)
-            bone.property_overridable_library_set(f'["{name}"]', True)
+    """Sides of units, and the blood of inferred emotions without their muscles, which the skins of the rig then hear."""
+    moods = [name for name in performance.controls if name.endswith(MOOD_SUFFIX)]
+    new = [name for name in moods if name not in rig.pose.bones[CONTROL_BONE]]
+    add_controls(rig, emotions_of(rig), moods)
+    for face in rig.children if new else ():
+        if face.type == "MESH" and RECORD not in face and (names := blood_properties(face)):  # baked blood turns stale
+            drive_settled(rig, face, names)
 
 
 def _push_down(animation: bpy.types.AnimData) -> None:

@@ -23,9 +23,6 @@ import numpy as np
 from .capture_units import units_of_keys
 from .facs import ACTION_UNITS, DEFAULT_EMOTIONS, EMOTION_MAX, emotion_units, shape_key_values
 
-SUFFIX = "_blood"
-"""`anger_blood` moves the blood of anger as the slider `anger` does, and no muscle."""
-
 UNREADABLE = {"arousal": "its open lips and heavy lids are those of anyone who speaks or blinks"}
 """Emotions that no recording of a face tells."""
 

@@ -35,10 +35,12 @@ Kind = Literal["live_link_face", "openface", "mediapipe"]
 # Half an hour of OpenFace with every landmark, or three hours of Live Link Face.
 MAX_BYTES = 512 * 1024 * 1024
 MAX_ROWS, MAX_COLUMNS = 1_000_000, 4096
+MAX_SECONDS = 3 * 3600.0
 FRAME_RATES = (23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
 MIN_CONFIDENCE = 0.5
 """OpenFace rows below are gaps. Its own `success` is set above 0.7 or so, depending on the version."""
 _STANDARD_RATE = 0.003  # relative; 23.976 and 24 are 0.001 apart, so the nearest wins; what is farther is kept as it is
+_LARGEST_TICK = 1e19  # nanoseconds since 1970 are 2e18
 _LONGEST_DAY = 24 * 3600.0
 _SLACK = 0.2  # how far outside 0-1 a tracker's noise may leave a value before the column is something else
 
@@ -140,6 +142,8 @@ def read_take(path: str | os.PathLike[str], source_fps: float | None = None) -> 
             f"confidence and AU01_r … (OpenFace), or blend shapes and a time (MediaPipe)"
         )
     take.seconds = take.seconds - take.seconds[0]
+    if not take.seconds[-1] <= MAX_SECONDS:
+        raise InputError(f"{path}: spans {take.seconds[-1] / 3600:.3g} hours, at most {MAX_SECONDS / 3600:g} are read: split the take")
     return take
 
 
@@ -457,6 +461,9 @@ def _clock(
         values = table.numbers(columns[clock])
         steps = np.diff(np.sort(values))
         if np.any(steps > 0):
+            if np.abs(values).max() > _LARGEST_TICK:
+                row = int(np.abs(values).argmax())
+                raise InputError(f"{table.where(row, table.header[columns[clock]])}: {values[row]:g} is no time")
             scale = unit if unit is not None else _unit_of(float(np.median(steps[steps > 0])), clock, notes)
             seconds = (values - values.min()) * scale
             return seconds, source_fps or detected_rate(seconds)

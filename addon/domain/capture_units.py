@@ -29,6 +29,7 @@ _REPLACES = {"27": "26"}  # at full strength it stands in the place of the other
 _BOTH_EYES = ("61", "62", "63", "64", "65", "66")  # eyes turn together; one side of a gaze is no unit of FACS
 _RIDGE = 2e-3  # of each unit's own square: a unit alone comes out 0.2 % low
 _ITERATIONS, _TOLERANCE = 600, 1e-4
+_CHUNK = 20_000  # frames at a time, for memory
 _LEAST_LEFT = 0.5
 
 # How far full units turn the eyes of the example head (fitted rotation of its eyeLook keys), degrees.
@@ -39,7 +40,7 @@ EYE_TURN_DEG = {"61": 14.6, "62": 14.6, "63": 9.6, "64": 11.0}
 class Followed:
     """controls : 'AU12L' … -> (N,) 0-1, the sliders that make the face of the recording.
     shown    : the same units as they are then seen, some faded by others (rigs/action_units.toml, interference)
-    residual : key -> (N,) recorded less followed, where units add up (the rig's clamps and fades aside)
+    residual : key -> (N,) recorded less the sum of the units, clamps and fades of the rig aside
     """
 
     controls: dict[str, np.ndarray]
@@ -86,7 +87,10 @@ def units_of_keys(keys: Mapping[str, np.ndarray]) -> Followed:
     for later in (False, True):
         names = [name for name in columns if (name.rstrip("LR") in _LATER) == later]  # parts of _FIRST, then of _LATER
         matrix = np.array([columns[name] for name in names])
-        values = _bounded_least_squares(matrix, np.maximum(left, 0.0) if later else left)
+        wanted = np.maximum(left, 0.0) if later else left
+        values = np.concatenate(
+            [_bounded_least_squares(matrix, wanted[i : i + _CHUNK]) for i in range(0, max(count, 1), _CHUNK)]
+        )
         left = left - values @ matrix
         found |= {name: values[:, i] for i, name in enumerate(names)}
     return Followed(

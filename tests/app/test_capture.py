@@ -101,8 +101,9 @@ def test_one_frame_is_a_pose(tmp_path):
     assert performance.frames == 1 and performance.controls["AU26"][1] == pytest.approx([1.0], abs=0.01)
 
 
-def test_a_take_of_days_is_refused(tmp_path):
+@pytest.mark.parametrize(("end", "message"), [(1e4, "are more than 500000 frames"), (1e6, "spans 278 hours"), (1e300, "1e\\+300 is no time")])
+def test_a_take_without_end_is_refused_before_it_costs_memory(tmp_path, end, message):
     keys = {key: np.zeros(2) for key in ARKIT.keys}
-    path = write_mediapipe(tmp_path / "a.csv", np.array([0.0, 1e6]), keys, "seconds")
-    with pytest.raises(InputError, match="are more than 500000 frames"):
-        capture(path)
+    path = write_mediapipe(tmp_path / "a.csv", np.array([0.0, end]), keys, "seconds")
+    with pytest.raises(InputError, match=message):
+        capture(path, 120.0)

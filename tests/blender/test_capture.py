@@ -8,6 +8,9 @@ from support.captures import add, blinking, noisy, showing, talking, write_live_
 from sanguine.app.capture import capture
 from sanguine.blender import capture as blender_capture
 from sanguine.blender import controls, curves
+from sanguine.blender.bake import bake_blood
+from sanguine.blender.blood import blood_sliders, drive_blood
+from sanguine.domain.blood import BLOOD
 from sanguine.domain.errors import InputError
 from sanguine.domain.facs import ARKIT, DEFAULT_EMOTIONS
 
@@ -97,6 +100,29 @@ def test_sliders_that_the_rig_lacks_are_added(rig, take):
     assert {"AU12L", "AU4R", "anger_blood"} <= set(bone.keys())
     ui = bone.id_properties_ui("anger_blood").as_dict()
     assert ui["max"] == 1.5 and ui["description"]
+
+
+def test_blood_follows_the_inferred_emotion_and_no_muscle_moves_twice(rig, take):
+    face = bpy.data.objects["face"]
+    drive_blood(rig, face, BLOOD.channels(blood_sliders(rig)).values())
+    performance = capture(take, 24.0)
+    blender_capture.import_performance(rig, performance, start=1)
+    frame = 1 + 3 * 24
+    level = value_at(rig, "anger_blood", frame)
+    assert level > 0.7 and value_at(rig, "anger", frame) == 0.0
+    shown = face.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    sliders = {"anger_blood": level, "blood": 1.0}
+    for channel in BLOOD.channels(blood_sliders(rig)).values():
+        assert shown[channel.property_name] == pytest.approx(channel.response.value(sliders), abs=1e-6)
+    assert shown["blood_hemoglobin_cheeks"] > 0.005
+    # In time: baked, the blood comes after the face and stays longer.
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 1 + performance.frames
+    bake_blood(face, rig, scene)
+    keys = np.array([key.co for key in curves.find_curve(face, '["blood_hemoglobin_cheeks"]').keyframe_points])
+    anger = performance.controls["anger_blood"][1]
+    assert keys[keys[:, 1].argmax(), 0] > 1 + np.flatnonzero(anger > 0.9 * anger.max())[0]
+    assert keys[-1, 1] > 0.1 * keys[:, 1].max() and anger[-1] < 0.1 * anger.max()
 
 
 def test_operator_at_the_rate_of_the_scene(rig, take):
