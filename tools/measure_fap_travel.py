@@ -1,4 +1,4 @@
-"""Writes rigs/mpeg4_travel.csv anew: how far each shape key of the example heads moves each MPEG-4 feature point, as FAP.
+"""Writes rigs/mpeg4_travel.csv anew: how far each shape key of the example heads moves MPEG-4's feature points, as FAP.
 
 Run after a change of the heads, their keys, or the points in rigs/mpeg4.toml.
 """
@@ -14,8 +14,11 @@ from sanguine.domain.resources import rigs_path
 
 def main() -> None:
     presets, regions = load_presets(rigs_path("heads.toml")), load_regions(rigs_path("regions.toml"))
-    heads = [build_head(presets[name], regions, lambda p: sanguine_core.read_image(str(p))[::-1]) for name in ("female", "male")]
-    female, male = (measure_travel(head) for head in heads)
+
+    def travel(name):
+        return measure_travel(build_head(presets[name], regions, lambda p: sanguine_core.read_image(str(p))[::-1]))
+
+    female, male = travel("female"), travel("male")
     with (rigs_path("mpeg4.toml").with_name("mpeg4_travel.csv")).open("w", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["fap", "key", "female", "male"])

@@ -111,6 +111,14 @@ class DriveReport:
     still: tuple[str, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What a user should know of it, a line each."""
+        lines = [*self.notes, *(f"{key}: driven by something else, left alone" for key in self.occupied)]
+        if self.missing:
+            lines.append(f"no shape key does the work of {', '.join(self.missing)}")
+        return tuple(lines)
+
 
 def add_controls(
     armature: bpy.types.Object,

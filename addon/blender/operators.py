@@ -96,6 +96,8 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         context.scene.cycles.shading_system = True
+        for line in driven.lines:
+            self.report({"INFO"}, line)
         running = ", ".join(effect.label for effect in plan.active)
         done = f"{running}; {material[MARK]['entries']} skins solved; {len(driven.driven)} shape keys driven"
         self.report({"INFO"}, f"{done}; {regions}" if regions else done)

@@ -1,8 +1,9 @@
-"""MPEG-4 face animation: feature points (FDP) of a head, its units of measure (FAPU), and parameters (FAP) from and to shape
-keys and action units.
+"""MPEG-4 face animation: feature points (FDP) of a head, its units of measure (FAPU), and parameters (FAP) from and to
+shape keys and action units.
 
-A FAP says how far a feature point goes, in 1024ths of a distance of the same face. How far our keys move these points is
-measured on a head (`measure_travel`); with that, keys become FAP by a sum, and FAP become keys by bounded least squares.
+A FAP says how far a feature point goes, in 1024ths of a distance of the same face. How far our keys move these points
+is measured on a head (`measure_travel`); with that, keys become FAP by a sum, and FAP become keys by bounded least
+squares.
 """
 
 from __future__ import annotations
@@ -36,10 +37,11 @@ _TONGUE_MIDDLE = 0.5
 _HAIRLINE_VERTICES = 5
 _COLUMN_M = 0.005  # a rule that looks at the midline sees this far to both sides
 _LEAST_SQUARES_ROUNDS = 400
-# Keys that say the same (a smile and a dimple) share what a FAP asks: this much weight, relative to the strongest key, on
-# small values. Small enough to change a FAP by less than a step in a hundred.
+# Keys that say the same (a smile and a dimple) share what a FAP asks: this much weight, relative to the strongest key,
+# on small values. Small enough to change a FAP by less than a step in a hundred.
 _RIDGE = 1e-4
-_LEAST_SHARE = 0.05  # of a FAP's range: what the face can do of it counts as this much at least, lest noise of still points count
+# Of a FAP's range: what the face can do of it counts as this much at least, lest the noise of still points count.
+_LEAST_SHARE = 0.05
 _BLINKS = ("45", "46")  # the shape of 43, told apart by time and side
 
 
@@ -126,9 +128,6 @@ def _check(name: str, known, where: str, kind: str) -> None:
         raise InputError(f"{where}: {name}: no such {kind}, {nearest(name, known)}")
 
 
-# --- feature points ---------------------------------------------------------------------------------------------------
-
-
 def _midline(part: MeshPart, index: np.ndarray | None = None) -> np.ndarray:
     v = part.vertices if index is None else part.vertices[index]
     return v[np.abs(v[:, 0]) < _COLUMN_M]
@@ -182,8 +181,8 @@ def _skull(head: Head, place: str) -> np.ndarray:
     return middle[middle[:, 1].argmax()]
 
 
-# The skull turns on the atlas between the mastoids, behind the lobes of the ears: their middle, at the height between lobe
-# and upper end of the ear's root. A rule of thumb.
+# The skull turns on the atlas between the mastoids, behind the lobes of the ears: their middle, at the height between
+# lobe and upper end of the ear's root. A rule of thumb.
 def _spine(points: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.mean([points[name] for name in ("10.7", "10.8", "10.9", "10.10")], axis=0)
 
@@ -245,7 +244,8 @@ def fapu_mm(points: Mapping[str, np.ndarray]) -> dict[str, float]:
         axis = _AXES[measure.axis]
         found[name] = float(points[measure.to][axis] - points[measure.from_][axis]) * 1e3
         if not found[name] > 0.0:
-            raise InputError(f"{name}: {found[name]:.3g} mm between points {measure.from_} and {measure.to}, has to be above 0")
+            between = f"between points {measure.from_} and {measure.to}"
+            raise InputError(f"{name}: {found[name]:.3g} mm {between}, has to be above 0")
     return found
 
 
@@ -271,9 +271,6 @@ def _checked(values: Mapping[str, float]) -> dict[str, float]:
         if not np.isfinite(value):
             raise InputError(f"{name}: {value} is not a number that a FAP can be")
     return dict(values)
-
-
-# --- parameters -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -370,8 +367,10 @@ def fap_to_keys(values: Mapping[str, float], travel: Travel | None = None) -> di
 
 
 def fap_to_controls(values: Mapping[str, float], travel: Travel | None = None) -> dict[str, float]:
-    """Action units, side by side (`AU12L`, `AU26`), 0-1, that come nearest to these FAP. Units that the rig shows only by
-    keys of others (fit "weak"), and the blinks 45 and 46, which are 43, are not used."""
+    """Action units, side by side (`AU12L`, `AU26`), 0-1, that come nearest to these FAP.
+
+    Units that the rig shows only by keys of others (fit "weak"), and the blinks 45 and 46, which are 43, are not used.
+    """
     travel = travel or example_travel()
     controls, columns = _unit_columns(travel)
     return _solve(values, travel, controls, columns)
@@ -407,7 +406,9 @@ def _unit_columns(travel: Travel) -> tuple[tuple[str, ...], np.ndarray]:
     return tuple(names), np.stack(columns, axis=1)
 
 
-def _solve(values: Mapping[str, float], travel: Travel, names: tuple[str, ...], columns: np.ndarray) -> dict[str, float]:
+def _solve(
+    values: Mapping[str, float], travel: Travel, names: tuple[str, ...], columns: np.ndarray
+) -> dict[str, float]:
     """min |columns x - values|^2, 0 <= x <= 1, by coordinate descent: exact steps, so that it never rises."""
     wanted = _checked(values)
     rows = [row for row, name in enumerate(travel.faps) if name in wanted]

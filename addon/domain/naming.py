@@ -1,7 +1,7 @@
 """Other names for the same face: which of a mesh's shape keys are which ARKit key, action unit or emotion.
 
 A convention is one file in rigs/names/: a row says of which of our names a foreign key is made. Spelling is no part of
-it: case, separators, sides (`_L`, `.R`, `Left`, `r_`) and prefixes (`blendShape1.`, `head_`) are stripped here, for all.
+it: case, separators, sides (`_L`, `.R`, `Left`, `r_`) and prefixes (`blendShape1.`, `head_`) are stripped here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .facs import (
 from .resources import Row, read_table, rigs_path
 from .response import Formula, Response
 
-# A key that is moved by two of ours at half their value each has shares of 0.5; more than 2 would be a unit of another kind.
+# A key that is moved by two of ours has shares of about 0.5; more than 2 would be a unit of another kind.
 Share = Annotated[float, Field(gt=0.0, le=2.0)]
 Shares = dict[str, float]
 
@@ -43,7 +43,7 @@ _COPY = re.compile(r"\.\d{3}$")  # what Blender appends to a name that is taken
 _PATH = re.compile(r"[.:|/]")
 _IGNORED = frozenset({"basis", "base", "rest"})  # the key that others are relative to
 _MOST_PREFIX_PARTS = 6
-# A name of fewer letters after a prefix was dropped could be anything ("hand_A"), unless other keys have that prefix too.
+# A name of fewer letters after a dropped prefix could be anything ("hand_A"), unless other keys have the prefix too.
 _STRONG_LETTERS = 7
 _SHARED_PREFIX = 3
 _SQUASHED_LETTERS = 4  # "jawl"
@@ -65,10 +65,13 @@ class KeyRow(Row):
 class Names(Row):
     """One file of rigs/names/.
 
-    label: for people. source: where the names were read. prefixes: what the convention puts before every name. at_least:
-    of how many keys a mesh must have before this convention is believed. identity: all of our own names are rows as they
-    are. keys: rows; `"browDownLeft"` and `{ browDownLeft = 1.0 }` are short for `{ of = { browDownLeft = 1.0 } }`. aliases:
-    another spelling -> key. absent: keys that have no counterpart (`*` at the end: all that begin so) -> why.
+    label    : for people; source: where the names were read
+    prefixes : what the convention puts before every name
+    at_least : so many of its keys a mesh must have before the convention is believed
+    identity : all of our own names are rows as they are
+    keys     : rows; "browDownLeft" and { browDownLeft = 1.0 } are short for { of = { browDownLeft = 1.0 } }
+    aliases  : another spelling -> key
+    absent   : keys that have no counterpart (`*` at the end: all that begin so, after the prefix) -> why
     """
 
     label: str
@@ -106,8 +109,8 @@ def known_targets() -> frozenset[str]:
 
 
 def form(name: str) -> str:
-    """`name` without its spelling: words in lower case, numbers without leading zeros, a side as `<` or `>`; a single side
-    stands at the end, wherever it was. `browDownLeft`, `BrowDown_L` and `l_brow_down` have the same form."""
+    """`name` without its spelling: words in lower case, numbers without leading zeros, a side as `<` or `>`; a single
+    side stands at the end, wherever it was. `browDownLeft`, `BrowDown_L` and `l_brow_down` have the same form."""
     return _joined(_words(name))
 
 
@@ -139,15 +142,16 @@ def mirrored(name: str) -> str:
 def read_names(path: Path) -> Names:
     """A convention, of ours or a user's own.
 
-    Raises InputError, one line, for what is not declared by `Names`, an unknown ARKit key, unit or emotion, a key that is
-    there twice in two spellings, and a key without its other side.
+    Raises InputError, one line, for what is not declared by `Names`, an unknown ARKit key, unit or emotion, a key that
+    is there twice in two spellings, and a key without its other side.
     """
     names = read_table(path, Names)
     targets, rows = known_targets(), names.rows()
     for key, row in rows.items():
         for target in row.of:
             if target not in targets:
-                raise InputError(f"{path}: keys.{key}: {target}: no such ARKit key, unit or emotion, {nearest(target, targets)}")
+                hint = nearest(target, targets)
+                raise InputError(f"{path}: keys.{key}: {target}: no such ARKit key, unit or emotion, {hint}")
     spelled: dict[str, str] = {}
     for key in (*rows, *names.aliases, *(key for key in names.absent if not key.endswith("*"))):
         if not (own := form(key)):
@@ -157,7 +161,8 @@ def read_names(path: Path) -> Names:
         spelled[own] = key
     for alias, key in names.aliases.items():
         if key not in rows and key not in names.absent:
-            raise InputError(f"{path}: aliases.{alias}: {key}: no such key here, {nearest(key, (*rows, *names.absent))}")
+            hint = nearest(key, (*rows, *names.absent))
+            raise InputError(f"{path}: aliases.{alias}: {key}: no such key here, {hint}")
     for key, row in names.keys.items():
         other = rows.get(spelled.get(form(key).translate(_MIRROR), ""))
         if other is None:
@@ -181,15 +186,15 @@ def conventions() -> dict[str, Names]:
 class Recognised:
     """What the shape keys of a mesh are.
 
-    convention : the one most of them follow, None if no key is known; sure : 0 to 1, the share of the keys that it could
-        explain and does, less when there are few of them
+    convention : the one most of them follow, None if no key is known
+    sure       : 0 to 1, the share of the keys that it could explain and does, less when there are few of them
     followed   : convention -> how many keys are mapped by it, best first; mixed rigs have several
     mapping    : mesh key -> ((ARKit key, control of a unit or emotion; share), ...)
     missing    : ARKit keys that nothing on the mesh expresses
     unknown    : mesh keys that nobody knows
     absent     : mesh keys known to have no counterpart -> why
     spare      : mesh keys known but not used, as others move the same part of the face already -> which
-    ambiguous  : name in the convention -> the mesh keys that could be it. The best spelled one is used, none if they tie.
+    ambiguous  : name in the convention -> the mesh keys that could be it; the best spelled is used, none if they tie
     notes      : one line for a user about each that is spare or ambiguous
     """
 
@@ -316,7 +321,8 @@ class Recogniser:
                         continue
                 key, row = candidates[0][1], table[name]
                 claims = _claims(row.of)
-                if name in UNIT_CONTROLS and (halves := [rows[half] for half in (f"{name}L", f"{name}R") if half in rows]):
+                halves = [rows[half] for half in (f"{name}L", f"{name}R") if half in rows]
+                if halves and name in UNIT_CONTROLS:
                     spare[key] = tuple(half[0][1] for half in halves)
                     continue
                 if taken := tuple(dict.fromkeys(reached[claim] for claim in claims if claim in reached)):
@@ -488,7 +494,8 @@ def mesh_responses(found: Recognised, formulas: Formulas, emotions: Iterable[str
             elif name in UNIT_CONTROLS and whole:
                 terms.append((share, unit_alone(name, others)))
             elif name in UNIT_CONTROLS:
-                sides = [side for side in ACTION_UNITS[name[2:].rstrip("LR")].sides if name[-1] not in "LR" or f"AU{side}" == name]
+                unit = ACTION_UNITS[name[2:].rstrip("LR")]
+                sides = [side for side in unit.sides if name == f"AU{unit.id}" or name == f"AU{side}"]
                 terms += [(share / len(sides), formulas.units[side]) for side in sides]
         if len(terms) == 1 and terms[0][0] == 1.0 and isinstance(terms[0][1], Response):
             responses[key] = terms[0][1]

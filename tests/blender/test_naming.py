@@ -69,6 +69,8 @@ def test_what_is_driven_or_not_understood_is_left_alone_and_said(rig):
     assert report.driven == ("browDown_R",)
     assert report.occupied == ("head: browDown_L",)
     assert report.notes == ("head: jaw_open, JawOpen: all of them could be jawOpen; none is used, rename one",)
+    assert report.lines[0] == report.notes[0] and "head: browDown_L: driven by something else, left alone" in report.lines
+    assert report.lines[-1].startswith("no shape key does the work of browDownLeft, browInnerUp, ")
     assert {"jawOpen", "browDownLeft"} <= set(report.missing) and "browDownRight" not in report.missing
     assert keys.animation_data.drivers.find('key_blocks["browDown_L"].value').driver.expression == "0.25"
     controls.remove_shape_key_drivers(rig, [mesh])

@@ -416,5 +416,13 @@ def test_the_page_has_the_numbers(name):
     assert counts == [len(names.rows()), len(names.absent), 52 - len(found.missing), len(emotions)]
 
 
+def test_the_example_of_the_page_works(tmp_path):
+    path = tmp_path / "house.toml"
+    page = (Path(__file__).parents[2] / "docs/names.md").read_text()
+    path.write_text(page.split("```toml\n")[1].split("```")[0])
+    found = recognise(["hr_Smile_L", "hr_smile_r", "frown", "gape", "hr_ear_up"], {"house": read_names(path)})
+    assert len(found.mapping) == 4 and found.absent == {"hr_ear_up": "ears"} and found.mapping["gape"] == (("AU27", 1.3),)
+
+
 def test_all_files_are_listed():
     assert {file.stem for file in rigs_path("names").iterdir()} == set(CONVENTIONS)
