@@ -54,11 +54,11 @@ def test_options_do_what_they_say(angry):
     rough = lambda p: np.abs(np.diff(p.controls["AU4L"][1], 2)).mean()  # noqa: E731
     assert rough(smooth) < 0.5 * rough(plain)
     assert not plain.emotions()
-    reduced = capture(path, 24.0, emotions=(), reduce=0.01)
+    reduced = capture(path, 24.0, emotions=(), reduce=0.03)  # twice the noise
     keys = sum(len(frames) for frames, _ in reduced.controls.values())
-    assert keys < 0.7 * sum(len(frames) for frames, _ in plain.controls.values())
+    assert keys < 0.5 * sum(len(frames) for frames, _ in plain.controls.values())
     for name, (frames, values) in reduced.controls.items():
-        np.testing.assert_allclose(np.interp(np.arange(289), frames, values), plain.controls[name][1], atol=0.01 + 1e-9)
+        np.testing.assert_allclose(np.interp(np.arange(289), frames, values), plain.controls[name][1], atol=0.03 + 1e-9)
     assert "not inferred" in capture(path, emotions=("arousal",)).notes[-1]
 
 
