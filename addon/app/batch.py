@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -18,6 +17,7 @@ from ..domain.files import atomic, read_json, write_json
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice, Settings
 from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
+from .map_cache import key_of
 from .skin_maps import Tiles, read_face_maps
 
 MANIFEST = "manifest.json"
@@ -30,14 +30,22 @@ _SUFFIXES = (".png", ".exr")
 class Renderer(Protocol):
     """What the batch needs of Blender."""
 
+    version: str
+    """Of Blender: another one may render another picture."""
+
     def regions(self, subject: Subject) -> tuple[str, ...]:
         """Regions whose masks the subject's face has."""
 
     def prepare(self, shot: Shot, subject: Subject, plan: Plan, images: Mapping[str, Tiles]) -> None:
-        """Builds the subject's scene in an empty file. images: the maps that came with the face."""
+        """Builds the subject's scene in an empty file; a timeline is keyed, its blood baked. images: the maps that came
+        with the face."""
 
     def render(self, pose: Pose, frame: int, png: Path, exr: Path) -> None:
-        """Renders one pose of the prepared subject: display-referred PNG and linear EXR of the same render."""
+        """Renders one pose, or frame of the timeline, of the prepared subject: display-referred PNG and linear EXR of the
+        same render."""
+
+    def save(self, blend: Path) -> None:
+        """Keeps the prepared scene as a file that needs nothing of ours."""
 
 
 def render_batch(
@@ -49,8 +57,9 @@ def render_batch(
     resume: bool = False,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     quality: Choice | None = None,
+    keep_blend: bool = False,
 ) -> dict[str, Any]:
-    """Renders `shot` into the folder `out` and returns the manifest.
+    """Renders `shot` into the folder `out` and returns the manifest. keep_blend: writes `<subject>.blend` beside it.
 
     Each image and the manifest are written whole or not at all, so a run can be killed at any moment; with
     `resume` an image is kept when its parameters and its checksum still agree with the manifest.
@@ -72,15 +81,21 @@ def render_batch(
         face = read_face_maps(subject.maps)
         plan = make_plan(scene_of(shot, subject, renderer.regions(subject), face.ranges), settings)
         missing = []
+        poses = [pose_of(shot, job).model_dump(exclude={"id", "frame"}) for job in jobs(shot) if job.subject == subject.id]
+        measured = shot.profile.model_dump_json() if shot.profile else ""
+        whole_shot = key_of(renderer.version, measured, shot.timeline.fps if shot.timeline else 0.0, poses)
         for job in mine:
-            prints = _fingerprint(shot, subject, job, settings, face.digest)
+            prints = key_of(whole_shot, _parameters(shot, subject, job, settings, face.digest))
             if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in _SUFFIXES):
                 done += 1
             else:
                 missing.append((job, prints))
-        if missing:
+        if missing or keep_blend:
             progress(f"preparing {subject.id}", done, len(wanted))
             renderer.prepare(shot, subject, plan, face.images)
+        if keep_blend:
+            with atomic(folder / f"{subject.id}.blend") as blend:
+                renderer.save(blend)
         for job, prints in missing:
             progress(f"rendering {job.id}", done, len(wanted))
             files |= _render(shot, subject, plan, job, face.digest, prints, folder, renderer)
@@ -120,19 +135,13 @@ def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps
         "effects": subject.strengths(shot.effects),
         "growth": asdict(subject.growth),
         "maps": maps,
-        "pose": pose_of(shot, job).model_dump(exclude={"id", "frame"}),
+        "pose": (pose := pose_of(shot, job)).model_dump(exclude={"id", "frame"}),
+        "blood": "as in life" if pose.blood <= 1.0 else f"exaggerated {pose.blood:g} times",
         "light": shot.light.model_dump(),
         "camera": shot.camera.model_dump(),
         "image": shot.image.model_dump(exclude={"samples"}),
         "quality": settings.model_dump(),
     }
-
-
-def _fingerprint(shot: Shot, subject: Subject, job: Job, settings: Settings, maps: str) -> str:
-    """Changes with anything that changes the image. The whole shot's plan is in it by its poses."""
-    poses = [pose_of(shot, other).model_dump(exclude={"id", "frame"}) for other in jobs(shot) if other.subject == subject.id]
-    what = [sanguine_core.__version__, _parameters(shot, subject, job, settings, maps), poses]
-    return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
 
 
 def _sha256(path: Path) -> str:

@@ -17,6 +17,7 @@ import sanguine_core
 
 from ..domain.errors import InputError
 from ..domain.files import atomic
+from ..domain.resources import rigs_path, shaders_path
 
 _SUFFIX = ".npy"
 
@@ -92,9 +93,15 @@ def key_of(*what: Any) -> str:
 
 @functools.cache
 def _program() -> bytes:
-    """Another build, or an edit of the files that lead to a map, may paint another picture without another version."""
+    """Another build, or an edit of the files that lead to a map or a picture, may paint another one without another version."""
     here = Path(__file__).resolve().parent
-    sources = sorted(path for folder in (here, here.parent / "domain") for path in folder.rglob("*.py"))
+    data = (rigs_path("blood.toml").parent, shaders_path("surface.osl").parent)
+    sources = sorted(
+        path
+        for folder in (here, here.parent / "domain", *data)
+        for path in folder.rglob("*")
+        if path.suffix in (".py", ".toml", ".csv", ".osl")
+    )
     digest = hashlib.sha256()
     for path in (Path(sanguine_core._core.__file__), *sources):
         digest.update(hashlib.sha256(path.read_bytes()).digest())

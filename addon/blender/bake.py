@@ -16,19 +16,16 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, blood_property
+from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, blood_property
 from ..domain.effects import pressure
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
-from .blood import blood_properties, blood_sliders, drive_settled, remove_blood_drivers
+from .blood import blood_model, blood_properties, blood_sliders, drive_settled, remove_blood_drivers
 from .controls import CONTROL_BONE
 from .curves import action_curve, curves, ensure_action, remove_curve, set_keys
 
 RECORD = "sanguine_bake"
 """Custom property of a baked face: what was baked, and from what."""
-
-_MODEL = hashlib.sha256(repr((BLOOD, VASCULAR)).encode()).hexdigest()
-
 
 @dataclass(frozen=True)
 class BakeState:
@@ -56,7 +53,7 @@ def bake_blood(
     frames = np.arange(first, last + 1)
     values = sample(armature, scene, frames, progress)
     controls = Controls(frames * (scene.render.fps_base / scene.render.fps), values)
-    changes = {blood_property(quantity, region): c for (region, quantity), c in blood_over_time(controls).items()}
+    changes = {blood_property(quantity, region): c for (region, quantity), c in blood_over_time(controls, blood_model(armature)).items()}
     if PRESSURE_CONTROL in values:
         changes[pressure.PROPERTY] = pressure_over_time(controls, values[PRESSURE_CONTROL])
     write_blood(face, frames, changes)
@@ -147,7 +144,7 @@ def fingerprint(armature: bpy.types.Object, scene: bpy.types.Scene) -> str:
         if name in bone and f'pose.bones["{CONTROL_BONE}"]["{name}"]' not in animated and not _strips(animation)
     }
     what = [
-        _MODEL,
+        hashlib.sha256(repr((blood_model(armature), VASCULAR)).encode()).hexdigest(),
         scene.render.fps / scene.render.fps_base,
         still,
         [_curve_print(curve) for curve in _slider_curves(armature)],

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import bpy
 
-from ..domain.blood import BLOOD, BLOOD_DRIVERS, MOOD_SUFFIX, PRESSURE_CONTROL, PULSE_CONTROL, BloodChannel
+from ..domain.blood import (
+    BLOOD,
+    BLOOD_DRIVERS,
+    MOOD_SUFFIX,
+    PRESSURE_CONTROL,
+    PULSE_CONTROL,
+    Blood,
+    BloodChannel,
+)
 from ..domain.effects import pressure
 from ..domain.facs import EMOTION_CONTROLS
+from ..domain.files import validate
+from ..domain.profile import Profile, with_profile
 from ..domain.response import MAX_EXPRESSION, Response, Sum, driver_text
 from .controls import CONTROL_BONE, describe, drive
 
@@ -35,9 +46,28 @@ def blood_sliders(armature: bpy.types.Object) -> tuple[str, ...]:
     return tuple(name for name in known if name in bone)
 
 
+PROFILE = "sanguine_profile"
+"""Custom property of a rig whose blood was measured: the profile as JSON, so that the file needs no other."""
+
+
+def set_profile(armature: bpy.types.Object, profile: Profile | None) -> None:
+    """Makes the rig's blood that of a profile; None: that of rigs/blood.toml. Apply the skin, or bake, after it."""
+    if profile is not None:
+        armature[PROFILE] = profile.model_dump_json()
+    elif PROFILE in armature:
+        del armature[PROFILE]
+
+
+def blood_model(armature: bpy.types.Object) -> Blood:
+    """What moves the blood of a rig. Raises InputError for a profile that this version cannot read."""
+    if PROFILE not in armature:
+        return BLOOD
+    return with_profile(BLOOD, validate(Profile, json.loads(armature[PROFILE]), f"{armature.name}: {PROFILE}"))
+
+
 def drive_settled(armature: bpy.types.Object, skin: bpy.types.Object, names: Collection[str]) -> None:
     """Puts the driven properties `names`, those that a material reads, on `skin`: blood as far as the rig moves it."""
-    channels = BLOOD.channels(blood_sliders(armature)).values()
+    channels = blood_model(armature).channels(blood_sliders(armature)).values()
     drive_blood(armature, skin, [channel for channel in channels if channel.property_name in names])
     if pressure.PROPERTY in names:
         drive_pressure(armature, skin)

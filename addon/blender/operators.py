@@ -5,13 +5,13 @@ from __future__ import annotations
 import bpy
 
 from ..domain.effects import Frame, Scene
-from ..domain.blood import PRESSURE_CONTROL
+from ..domain.blood import BLOOD, PRESSURE_CONTROL
 from ..domain.facs import DEFAULT_EMOTIONS
 from ..domain.people import SEXES, TONES, person
 from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from ..domain.vascular import reach
-from .blood import blood_sliders
+from .blood import blood_model, blood_sliders
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .material import MARK
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
@@ -41,11 +41,11 @@ def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
 def live_plan(face: bpy.types.Object) -> Plan:
     """The plan while an artist works: every emotion on the rig may still be pulled, every skin slider moved."""
     bone = emotion_bone(face)
-    sliders = blood_sliders(bone.id_data) if bone is not None else DEFAULT_EMOTIONS
+    sliders, blood = (blood_sliders(bone.id_data), blood_model(bone.id_data)) if bone is not None else (DEFAULT_EMOTIONS, BLOOD)
     return make_plan(
         Scene(
             skin=skin_of(face),
-            frames=(Frame("live", dict.fromkeys(sliders, 1.0), changes=reach(sliders)),),
+            frames=(Frame("live", dict.fromkeys(sliders, 1.0), changes=reach(sliders, blood)),),
             strengths=strengths_of(face),
             regions=face_regions(face),
             live=True,

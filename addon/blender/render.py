@@ -21,6 +21,7 @@ from ..domain.effects.regions import FACE_REGIONS
 from ..domain.plan import Plan
 from ..domain.shot import Image, Performance, Pose, Shot, Subject, Timeline, feelings_of, performance, pose_at
 from .bake import write_blood
+from .blood import set_profile
 from .controls import CONTROL_BONE, CONTROLS, set_controls
 from .curves import action_curve, ensure_action, set_keys
 from .face import Face, add_face
@@ -31,6 +32,7 @@ from .stage import LIGHTS, set_stage
 class BlenderRenderer:
     """Implements `app.batch.Renderer`."""
 
+    version = bpy.app.version_string
     _rig: bpy.types.Object
     # Whether the scene is animated, or posed anew for each picture.
     _plays: bool
@@ -53,6 +55,7 @@ class BlenderRenderer:
                 lights=tuple(replace(light, power=light.power * shot.light.strength) for light in LIGHTS),
             )
             set_image(scene, shot.image, plan.settings.samples)
+            set_profile(face.rig, shot.profile)
             apply_skin(face.skin, face.rig, plan, given=images)
             played = performance(shot)
             if played is not None:
@@ -72,6 +75,13 @@ class BlenderRenderer:
             bpy.ops.render.render()
             save_render(scene, png, "PNG")
             save_render(scene, exr, "OPEN_EXR")
+
+
+    def save(self, blend: Path) -> None:
+        with quiet():
+            bpy.context.scene.frame_set(bpy.context.scene.frame_start)
+            blend.unlink(missing_ok=True)  # else Blender keeps the empty file of this name as a backup
+            bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True, compress=True, check_existing=False)
 
 
 def _play(face: Face, timeline: Timeline, played: Performance) -> None:

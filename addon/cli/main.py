@@ -177,6 +177,8 @@ def _parser() -> argparse.ArgumentParser:
     _quality_flags(render)
     render.add_argument("--only", metavar="ID,…", help="only these images")
     render.add_argument("--resume", action="store_true", help="keep what an earlier run of the same shot finished")
+    render.add_argument("--blend", action="store_true",
+                        help="keep the scene of each subject as <subject>.blend, which needs nothing of ours")
     return parser
 
 
@@ -466,7 +468,7 @@ def _render(options: argparse.Namespace) -> int:
         raise InputError("render: no Blender module: run this inside Blender, or `pip install bpy==4.5.15`") from None
     with reporter(options.json_progress) as progress:
         render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
-                     progress=progress, quality=quality)
+                     progress=progress, quality=quality, keep_blend=options.blend)
     return 0
 
 

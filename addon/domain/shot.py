@@ -15,7 +15,7 @@ import numpy as np
 import pydantic
 
 from . import people
-from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, PULSE_CONTROL, STATES, Blood, Change
+from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, PULSE_CONTROL, STATES, Blood, Change, settled
 from .effects import Frame, Growth, Scene
 from .effects.effect import Interval
 from .errors import InputError, nearest
@@ -24,6 +24,7 @@ from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
 from .plan import check_strengths
+from .profile import Profile, read_profile, with_profile
 from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
 from .udim import find_tiles
@@ -230,6 +231,9 @@ class Shot(_Table):
     expression: list[Expression] = []
     timeline: Timeline | None = None
     quality: str = DEFAULT
+    # A file of `sanguine physiology`: measured changes of blood in the place of the table's. Its path is relative to the
+    # shot's.
+    blood_profile: str | None = None
     light: Light = Light()
     camera: Camera = Camera()
     image: Image = Image()
@@ -247,6 +251,14 @@ class Shot(_Table):
             return Choice(point.settings, point, f"quality is '{self.quality}'")
         because = f"quality is '{self.quality}', but image.samples is {samples} instead of {point.samples}"
         return Choice(point.settings.model_copy(update={"samples": samples}), None, because)
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        return read_profile(self.blood_profile) if self.blood_profile is not None else None
+
+    @cached_property
+    def blood_model(self) -> Blood:
+        return with_profile(BLOOD, self.profile) if self.profile else BLOOD
 
     @property
     def subjects(self) -> list[Subject]:
@@ -302,7 +314,11 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
             item.model_copy(update={"maps": _found(item.maps, path, f"subject {item.id}: maps")}) for item in shot.subject
         ],
     }
-    return shot.model_copy(update=found)
+    if shot.blood_profile is not None:
+        found["blood_profile"] = str(Path(path).resolve().parent / shot.blood_profile)
+    shot = shot.model_copy(update=found)
+    shot.profile  # read now: what is wrong with it is said before any work
+    return shot
 
 
 def _found(maps: Maps, shot_path: str | os.PathLike[str], where: str) -> Maps:
@@ -395,7 +411,7 @@ class Performance:
         return {key: (float(change[i]),) * 2 for key, change in self.changes.items() if change[i]}
 
 
-def performance(shot: Shot, blood: Blood = BLOOD) -> Performance | None:
+def performance(shot: Shot) -> Performance | None:
     """The timeline of a shot with the blood that it brings; None of a shot of stills, whose blood is settled.
 
     It is that of the whole timeline, whichever frames are wanted: one frame alone is the same as in sequence.
@@ -408,7 +424,7 @@ def performance(shot: Shot, blood: Blood = BLOOD) -> Performance | None:
     names = dict.fromkeys(name for pose in poses for name in pose)
     every = {name: np.array([pose.get(name, 0.0) for pose in poses]) for name in names}
     kept = {name: series for name, series in every.items() if series.any() or name == BLOOD_CONTROL}
-    return Performance(frames, kept, blood_over_time(Controls(frames / shot.timeline.fps, kept), blood))
+    return Performance(frames, kept, blood_over_time(Controls(frames / shot.timeline.fps, kept), shot.blood_model))
 
 
 def feelings_of(shot: Shot) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -431,7 +447,10 @@ def scene_of(
         pose = pose_of(shot, job)
         feelings = {name: value for name, value in pose.feelings.items() if value > 0.0}
         moves = any(value > 0.0 for value in (*pose.emotions.values(), *pose.action_units.values()))
-        changes = timeline.at(job.frame) if timeline else None
+        if timeline:
+            changes = timeline.at(job.frame)
+        else:
+            changes = {key: (value, value) for key, value in settled(feelings, pose.blood, shot.blood_model).items()}
         frames.append(Frame(job.id, feelings, pose.blood, changes, moves))
     return Scene(
         skin=subject.whole_skin(),

@@ -18,6 +18,8 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "five_expressions.t
 class PaintRenderer:
     """Paints a flat image whose colour is the pose, in the place of Blender."""
 
+    version = "none"
+
     def __init__(self, die_at=None):
         self.rendered, self.prepared, self.die_at = [], [], die_at
 
@@ -26,6 +28,9 @@ class PaintRenderer:
 
     def prepare(self, shot, subject, plan, images):
         self.prepared.append((subject.id, plan))
+
+    def save(self, blend):
+        blend.write_bytes(b"scene")
 
     def render(self, pose, frame, png, exr):
         if len(self.rendered) == self.die_at:
