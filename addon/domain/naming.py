@@ -172,7 +172,7 @@ def read_names(path: Path) -> Names:
     return names
 
 
-CONVENTIONS = ("arkit", "ict", "metahuman", "cc4", "mpfb", "vroid", "vrm", "mpeg4", "facs")
+CONVENTIONS = ("arkit", "ict", "unified", "metahuman", "cc4", "mpfb", "vroid", "vrm", "rpm", "mpeg4", "facs")
 """Files of rigs/names/; where two fit a mesh equally well the first is taken."""
 
 
@@ -225,8 +225,7 @@ class Recognised:
         return self._made_of(frozenset(EMOTION_CONTROLS))
 
     def strongest(self) -> dict[str, str]:
-        """Mesh key -> the one ARKit key that it shows best: where that one goes, it goes. A key for both sides is not in
-        it."""
+        """Mesh key -> the one ARKit key that it shows best: where that one goes, it goes. Not one for both sides."""
         found = {}
         for key, shares in self.sources.items():
             first, *rest = sorted(shares, key=lambda name: -shares[name])

@@ -62,6 +62,13 @@ eyeLookUp_R eyeSquint_L eyeSquint_R eyeWide_L eyeWide_R jawForward jawLeft jawOp
 mouthDimple_R mouthFrown_L mouthFrown_R mouthFunnel mouthLeft mouthLowerDown_L mouthLowerDown_R mouthPress_L mouthPress_R
 mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthSmile_L mouthSmile_R mouthStretch_L
 mouthStretch_R mouthUpperUp_L mouthUpperUp_R noseSneer_L noseSneer_R""".split()
+UNIFIED = """BrowDownLeft BrowDownRight BrowInnerUpLeft BrowInnerUpRight BrowOuterUpLeft BrowOuterUpRight EyeClosedLeft EyeClosedRight
+EyeConstrict EyeDilation EyeLookDownLeft EyeLookDownRight EyeLookInLeft EyeLookInRight EyeLookOutLeft EyeLookOutRight EyeLookUpLeft
+EyeLookUpRight EyeSquintLeft EyeSquintRight EyeWideLeft EyeWideRight CheekPuffLeft CheekPuffRight CheekSquintLeft CheekSquintRight
+CheekSuckLeft CheekSuckRight LipFunnel LipFunnelLower LipFunnelUpper LipPucker LipSuckLower LipSuckUpper JawForward JawLeft JawOpen
+JawRight MouthClosed MouthFrownLeft MouthFrownRight MouthLeft MouthLowerDown MouthPress MouthRaiserLower MouthRaiserUpper MouthRight
+MouthSmileLeft MouthSmileRight MouthStretchLeft MouthStretchRight MouthTightenerLeft MouthTightenerRight MouthUpperUp MouthUpperUpLeft
+MouthUpperUpRight NoseSneer NoseSneerLeft NoseSneerRight TongueDown TongueLeft TongueOut TongueRight TongueUp""".split()
 VRM_0 = "Neutral A I U E O Blink Joy Angry Sorrow Fun LookUp LookDown LookLeft LookRight Blink_L Blink_R".split()
 VRM_1 = """happy angry sad relaxed surprised aa ih ou ee oh blink blinkLeft blinkRight lookUp lookDown lookLeft lookRight
 neutral""".split()
@@ -138,7 +145,8 @@ def test_every_descriptor_knows_its_own_names():
 
 @pytest.mark.parametrize(
     ("convention", "keys", "missing"),
-    [("ict", ICT, {"tongueOut"}), ("cc4", CC4, set()), ("metahuman", METAHUMAN, set())],
+    [("ict", ICT, {"tongueOut"}), ("cc4", CC4, set()), ("metahuman", METAHUMAN, set()),
+     ("unified", UNIFIED, {"mouthDimpleLeft", "mouthDimpleRight"})],
 )
 def test_real_lists_cover_arkit(convention, keys, missing):
     found = recognise(keys)
@@ -188,6 +196,13 @@ def test_whole_expressions_stand_back_where_single_keys_are():
     assert not found.missing and not found.emotions and not found.units
     assert "Face.M_F00_000_00_Fcl_ALL_Joy" in found.spare
     assert any("Fcl_ALL_Joy: not used" in note for note in found.notes)
+
+
+def test_ready_player_me_has_both_and_the_single_keys_win():
+    extras = ["mouthOpen", "mouthSmile", "eyesClosed", "eyesLookUp", "eyesLookDown", "viseme_aa"]
+    found = recognise([*ARKIT.keys, *extras])
+    assert not found.missing and set(found.spare) == set(extras[:5]) and "viseme_aa" in found.absent
+    assert recognise(extras).sources["mouthOpen"] == {"jawOpen": 1.0}
 
 
 def test_mpfb_units_are_those_of_the_package_with_measured_shares():
