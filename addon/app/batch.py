@@ -24,7 +24,7 @@ MANIFEST = "manifest.json"
 CONTACT_SHEET = "contact_sheet.png"
 # Beyond this a contact sheet shows nothing any more.
 _CONTACT_SHEET_IMAGES = 100
-_SUFFIXES = (".png", ".exr")
+IMAGE_SUFFIXES = (".png", ".exr")
 
 
 class Renderer(Protocol):
@@ -69,12 +69,12 @@ def render_batch(
     settings = (quality or shot.chosen_quality).settings
     folder = Path(out)
     wanted = [job for job in jobs(shot) if only is None or job.id in only]
-    whole = _finished(folder) if resume or only is not None else {}
+    whole = finished(folder) if resume or only is not None else {}
     kept = whole if resume else {}
     # With `only`, what an earlier run made of the other images stays in the manifest.
     files = {name: row for name, row in whole.items() if resume or Path(name).stem not in {job.id for job in wanted}}
     # Written before the work as well as after each image: an unwritable folder is found at once.
-    _write_manifest(folder, shot_path, files)
+    write_manifest(folder, shot_path, files)
     done = 0
     for subject in shot.subjects:
         mine = [job for job in wanted if job.subject == subject.id]
@@ -86,7 +86,7 @@ def render_batch(
         whole_shot = key_of(renderer.version, measured, shot.timeline.fps if shot.timeline else 0.0, poses)
         for job in mine:
             prints = key_of(whole_shot, _parameters(shot, subject, job, settings, face.digest))
-            if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in _SUFFIXES):
+            if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in IMAGE_SUFFIXES):
                 done += 1
             else:
                 missing.append((job, prints))
@@ -99,10 +99,10 @@ def render_batch(
         for job, prints in missing:
             progress(f"rendering {job.id}", done, len(wanted))
             files |= _render(shot, subject, plan, job, face.digest, prints, folder, renderer)
-            _write_manifest(folder, shot_path, files)
+            write_manifest(folder, shot_path, files)
             done += 1
     _contact_sheet(shot, folder, files)
-    _write_manifest(folder, shot_path, files)
+    write_manifest(folder, shot_path, files)
     progress("rendered", done, len(wanted))
     return read_json(folder / MANIFEST)
 
@@ -114,7 +114,7 @@ def _render(
     start = time.perf_counter()
     with atomic(folder / f"{job.id}.png") as png, atomic(folder / f"{job.id}.exr") as exr:
         renderer.render(pose, job.frame or 1, png, exr)
-        sums = {".png": _sha256(png), ".exr": _sha256(exr)}
+        sums = {".png": sha256(png), ".exr": sha256(exr)}
     row = {
         "subject": subject.id,
         "expression": job.expression,
@@ -124,7 +124,7 @@ def _render(
         "seconds": round(time.perf_counter() - start, 3),
         "fingerprint": fingerprint,
     }
-    return {job.id + suffix: {"file": job.id + suffix, "sha256": sums[suffix], **row} for suffix in _SUFFIXES}
+    return {job.id + suffix: {"file": job.id + suffix, "sha256": sums[suffix], **row} for suffix in IMAGE_SUFFIXES}
 
 
 def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps: str) -> dict[str, Any]:
@@ -144,12 +144,12 @@ def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps
     }
 
 
-def _sha256(path: Path) -> str:
+def sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _finished(folder: Path) -> dict[str, dict[str, Any]]:
+def finished(folder: Path) -> dict[str, dict[str, Any]]:
     """Files of an earlier manifest that are there and whole."""
     if not (folder / MANIFEST).exists():
         return {}
@@ -160,12 +160,12 @@ def _finished(folder: Path) -> dict[str, dict[str, Any]]:
     whole = {}
     for row in rows:
         path = folder / Path(str(row["file"])).name
-        if path.is_file() and _sha256(path) == row.get("sha256"):
+        if path.is_file() and sha256(path) == row.get("sha256"):
             whole[row["file"]] = row
     return whole
 
 
-def _write_manifest(folder: Path, shot_path: str | os.PathLike[str], files: dict[str, dict[str, Any]]) -> None:
+def write_manifest(folder: Path, shot_path: str | os.PathLike[str], files: dict[str, dict[str, Any]]) -> None:
     write_json(
         folder / MANIFEST,
         {"sanguine": sanguine_core.__version__, "shot": Path(shot_path).name,
@@ -180,4 +180,4 @@ def _contact_sheet(shot: Shot, folder: Path, files: dict[str, dict[str, Any]]) -
         return
     with atomic(folder / CONTACT_SHEET) as path:
         sanguine_core.contact_sheet([str(folder / f"{name}.png") for name in every], every, str(path))
-    files[CONTACT_SHEET] = {"file": CONTACT_SHEET, "sha256": _sha256(folder / CONTACT_SHEET), "of": every}
+    files[CONTACT_SHEET] = {"file": CONTACT_SHEET, "sha256": sha256(folder / CONTACT_SHEET), "of": every}

@@ -171,8 +171,16 @@ def _parser() -> argparse.ArgumentParser:
     _quality_flags(plan)
     plan.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    bake = _verb(verbs, "bake", _bake, "bake the blood of a .blend anew, so that a farm renders none that is stale")
+    bake.add_argument("scene", metavar="SCENE.blend")
+    bake.add_argument("--save", metavar="FILE.blend", help="write the baked file there (default: over SCENE.blend)")
+    bake.add_argument("--check", action="store_true", help="only say which blood is stale; exit status 1 if any is")
+    bake.add_argument("--scene", dest="name", default="", metavar="NAME", help="which scene of the file (default: the active one)")
+    bake.add_argument("--out", metavar="FILE", help="write the report there instead of to standard output")
+
     render = _verb(verbs, "render", _render, "render a shot: one image per subject, expression and frame")
-    render.add_argument("shot", metavar="SHOT.toml")
+    render.add_argument("shot", metavar="SHOT.toml|SCENE.blend",
+                        help="a .blend renders its scene's frames as it is set, its blood baked anew")
     render.add_argument("--out", required=True, metavar="DIR", help="folder for the images and manifest.json")
     _quality_flags(render)
     render.add_argument("--only", metavar="ID,…", help="only these images")
@@ -448,12 +456,13 @@ def _render(options: argparse.Namespace) -> int:
     from ..domain.shot import jobs, read_shot
     from .progress import reporter
 
+    only = [name for name in options.only.split(",") if name] if options.only is not None else None
+    if options.shot.endswith(".blend"):
+        return _render_scene(options, only)
     shot = read_shot(options.shot)
     quality = choice(options.quality, options.delta_e)
     check_folder(options.out)  # before Blender is loaded, which takes a second and may talk
-    only = None
-    if options.only is not None:
-        only = [name for name in options.only.split(",") if name]
+    if only is not None:
         known = [job.id for job in jobs(shot)]
         for name in only:
             if name not in known:
@@ -470,6 +479,48 @@ def _render(options: argparse.Namespace) -> int:
         render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
                      progress=progress, quality=quality, keep_blend=options.blend)
     return 0
+
+
+def _render_scene(options: argparse.Namespace, only: list[str] | None) -> int:
+    from ..app.scene_files import render_file
+    from ..domain.files import check_folder
+    from .progress import reporter
+
+    for flag in ("quality", "delta_e", "blend"):
+        if getattr(options, flag):
+            raise InputError(f"--{flag.replace('_', '-')}: for a SHOT.toml; {options.shot} has its own settings")
+    check_folder(options.out)
+    scene = _scene_file(options.shot)
+    with reporter(options.json_progress) as progress:
+        render_file(scene, options.shot, options.out, only, options.resume, progress)
+    return 0
+
+
+def _bake(options: argparse.Namespace) -> int:
+    from ..app.scene_files import bake_file
+    from .progress import reporter
+
+    if options.check and options.save:
+        raise InputError("--save: --check writes nothing, leave one of them out")
+    scene = _scene_file(options.scene, options.name)
+    with reporter(options.json_progress) as progress:
+        report = bake_file(scene, None if options.check else options.save or options.scene, progress)
+    _answer(report, options.out)
+    return 1 if options.check and report["stale"] else 0
+
+
+def _scene_file(path: str, name: str = "") -> Any:
+    from pathlib import Path
+
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        from ..blender.scene_file import SceneFile
+    except ModuleNotFoundError as error:
+        if error.name not in ("bpy", "_bpy"):
+            raise
+        raise InputError(f"{path}: needs Blender: run this inside it, or `pip install bpy==4.5.15`") from None
+    return SceneFile(path, name)
 
 
 def _number(text: str) -> float:

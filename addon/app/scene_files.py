@@ -1,0 +1,103 @@
+"""The use-cases of an artist's own file on a farm: bake its blood, render its frames. Never with blood that is stale."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import sanguine_core
+
+from ..domain.errors import InputError, nearest
+from ..domain.files import atomic
+from .batch import IMAGE_SUFFIXES, finished, sha256, write_manifest
+from .map_cache import key_of
+
+
+class Scene(Protocol):
+    """What is needed of an opened file."""
+
+    version: str
+
+    @property
+    def frames(self) -> range:
+        """What its scene renders."""
+
+    def stale(self) -> dict[str, str]:
+        """Face -> why its blood is not what the animation asks for; "" where it is."""
+
+    def bake(self, progress: Callable[[int, int], bool] | None = None) -> dict[str, tuple[int, int]]:
+        """Bakes every face's blood: face -> first and last frame."""
+
+    def save(self, path: Path) -> None: ...
+
+    def render(self, frame: int, png: Path, exr: Path) -> None: ...
+
+
+def bake_file(
+    scene: Scene,
+    target: str | os.PathLike[str] | None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> dict[str, Any]:
+    """Bakes the blood of a file and writes it to `target`; None: only says what is stale."""
+    before = scene.stale()
+    faces = {name: {"was": why or "fresh"} for name, why in before.items()}
+    if target is not None:
+        for name, (first, last) in scene.bake(_told(progress)).items():
+            faces[name] |= {"first": first, "last": last}
+        with atomic(target) as file:
+            scene.save(file)
+    return {"sanguine": sanguine_core.__version__, "faces": faces, "stale": sorted(name for name, why in before.items() if why)}
+
+
+def render_file(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    only: list[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> None:
+    """Renders the frames of a file into the folder `out`, after baking its blood anew, and writes the manifest.
+
+    only: names of images, the frames with six digits. Raises InputError for one that the scene does not render.
+    """
+    folder = Path(out)
+    names = {f"{frame:06d}": frame for frame in scene.frames}
+    for name in only or ():
+        if name not in names:
+            raise InputError(f"--only: no image '{name}' in {path}, {nearest(name, names)}")
+    baked = scene.bake(_told(progress))
+    wanted = [name for name in names if only is None or name in only]
+    fingerprint = key_of(scene.version, sha256(Path(path)))
+    whole = finished(folder) if resume or only is not None else {}
+    kept = {name for name, row in whole.items() if resume and row.get("fingerprint") == fingerprint}
+    files = {name: row for name, row in whole.items() if name in kept or Path(name).stem not in wanted}
+    write_manifest(folder, path, files)
+    for done, name in enumerate(wanted):
+        if all(name + suffix in kept for suffix in IMAGE_SUFFIXES):
+            continue
+        progress(f"rendering {name}", done, len(wanted))
+        start = time.perf_counter()
+        with atomic(folder / f"{name}.png") as png, atomic(folder / f"{name}.exr") as exr:
+            scene.render(names[name], png, exr)
+            sums = {".png": sha256(png), ".exr": sha256(exr)}
+        row = {
+            "frame": names[name],
+            "baked": {face: list(frames) for face, frames in baked.items()},
+            "seconds": round(time.perf_counter() - start, 3),
+            "fingerprint": fingerprint,
+        }
+        files |= {name + suffix: {"file": name + suffix, "sha256": sums[suffix], **row} for suffix in IMAGE_SUFFIXES}
+        write_manifest(folder, path, files)
+    progress("rendered", len(wanted), len(wanted))
+
+
+def _told(progress: Callable[[str, int, int], None]) -> Callable[[int, int], bool]:
+    def tell(done: int, total: int) -> bool:
+        progress("baking blood", done, total)
+        return True
+
+    return tell
