@@ -22,24 +22,30 @@ from .operators import active_face, controls_of, emotion_bone
 GROUP = "Capture"
 
 
-def import_performance(rig: bpy.types.Object, performance: Performance, start: int = 1) -> bpy.types.Action:
-    """Makes `performance` the action of `rig`, its first frame at `start`. Sliders that the rig lacks are added.
+def import_performance(
+    rig: bpy.types.Object, performance: Performance, start: int = 1
+) -> tuple[bpy.types.Action, tuple[str, ...]]:
+    """Makes `performance` the action of `rig`, its first frame at `start`.
 
-    Raises ValueError where Blender cannot take it, with nothing changed.
+    Sliders that the rig lacks are added, but not on a library override, which forgets them on saving. Returns the
+    action and the controls that had to be left out. Raises ValueError where Blender cannot take it, with nothing changed.
     """
     if rig.library is not None:
         raise InputError(f"{rig.name}: linked from another file: make a library override of it first")
     animation = rig.animation_data or rig.animation_data_create()
     if animation.use_tweak_mode:
         raise InputError(f"{rig.name}: an NLA strip is being edited: leave tweak mode first")
-    _add_sliders(rig, performance)
+    if rig.override_library is None:
+        _add_sliders(rig, performance)
+    bone = rig.pose.bones[CONTROL_BONE]
     _push_down(animation)
     action = ensure_action(rig, performance.name)
     for name, (frames, values) in performance.controls.items():
-        curve = action_curve(rig, f'pose.bones["{CONTROL_BONE}"]["{name}"]', group=GROUP)
-        set_keys(curve, frames + start, values)
+        if name in bone:
+            curve = action_curve(rig, f'pose.bones["{CONTROL_BONE}"]["{name}"]', group=GROUP)
+            set_keys(curve, frames + start, values)
     rig.update_tag()
-    return action
+    return action, tuple(name for name in performance.controls if name not in bone)
 
 
 def _add_sliders(rig: bpy.types.Object, performance: Performance) -> None:
@@ -138,11 +144,16 @@ class SANGUINE_OT_import_capture(bpy.types.Operator):
                 reduce=self.reduce,
                 head=self.head,
             )
-            import_performance(rig, performance, self.start)
+            _, left_out = import_performance(rig, performance, self.start)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for note in performance.notes:
+        notes = list(performance.notes)
+        if performance.head_deg and self.head and not any('"].rotation_' in curve.data_path for curve in rig.animation_data.drivers):
+            notes.append("the take turns the head, but the head's units move no bone of this rig")
+        if left_out:
+            notes.append(f"{', '.join(left_out)}: left out, the linked rig has no such sliders: add them in its own file")
+        for note in notes:
             self.report({"INFO"}, note)
         felt = ", ".join(f"{name} {level:.2f}" for name, level in performance.emotions().items())
         self.report(

@@ -273,7 +273,7 @@ def _without_face(table: _Table, count: int, notes: list[str]) -> _Table:
     return table.keep(seen)
 
 
-_TIMECODE = re.compile(r"(\d{1,2}):(\d{1,2}):(\d{1,2})([:;.])(\d{1,3})(?:\.(\d{1,9}))?")
+_TIMECODE = re.compile(r"(\d{1,2}):(\d{1,2}):(\d{1,2})([:;])(\d{1,3})(?:\.(\d{1,9}))?")
 
 
 def _timecodes(
@@ -322,6 +322,8 @@ def _timecodes(
         seconds = seconds + np.minimum(rank, doubles - 1) / (doubles * rate)
         notes.append(f"{doubles} rows to each timecode, spread: {doubles * rate:g} frames a second")
         rate *= doubles
+    elif len(frames) > 1:
+        rate /= max(1, round(float(np.median(np.diff(frames)))))  # 30 rows a second may count in sixtieths
     return seconds, source_fps if source_fps is not None else rate
 
 

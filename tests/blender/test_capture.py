@@ -56,8 +56,8 @@ def value_at(rig, name, frame):
 
 def test_scrubbing_shows_the_recorded_values(rig, take):
     performance = capture(take, 24.0, emotions=DEFAULT_EMOTIONS)
-    action = blender_capture.import_performance(rig, performance, start=11)
-    assert action.name == "angry" and rig.animation_data.action == action
+    action, left_out = blender_capture.import_performance(rig, performance, start=11)
+    assert left_out == () and action.name == "angry" and rig.animation_data.action == action
     for name in ("AU4L", "AU45R", "AU26", "AU51", "anger_blood"):
         frames, values = performance.controls[name]
         for i in range(0, len(frames), 13):
@@ -123,6 +123,32 @@ def test_blood_follows_the_inferred_emotion_and_no_muscle_moves_twice(rig, take)
     anger = performance.controls["anger_blood"][1]
     assert keys[keys[:, 1].argmax(), 0] > 1 + np.flatnonzero(anger > 0.9 * anger.max())[0]
     assert keys[-1, 1] > 0.1 * keys[:, 1].max() and anger[-1] < 0.1 * anger.max()
+
+
+def test_a_library_override_takes_a_capture_and_keeps_it(rig, take, tmp_path):
+    """It cannot keep new sliders: the library's rig has the blood of anger, and not that of happiness."""
+    controls.add_controls(rig, DEFAULT_EMOTIONS, ["anger_blood"])
+    library, shot = str(tmp_path / "rig.blend"), str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=library, check_existing=False)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.objects = ["rig", "face"]
+    linked = bpy.data.objects["rig"]
+    bpy.context.collection.objects.link(linked)
+    performance = capture(take, 24.0)
+    with pytest.raises(InputError, match="rig: linked from another file: make a library override"):
+        blender_capture.import_performance(linked, performance)
+    ours = linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    performance.controls["happy_blood"] = performance.controls["anger_blood"]
+    _, left_out = blender_capture.import_performance(ours, performance)
+    assert left_out == ("happy_blood",)
+    name = ours.name
+    bpy.ops.wm.save_as_mainfile(filepath=shot, check_existing=False)
+    bpy.ops.wm.open_mainfile(filepath=shot)
+    ours = next(thing for thing in bpy.data.objects if thing.name == name and thing.override_library)
+    frames, values = performance.controls["AU4L"]
+    assert value_at(ours, "AU4L", 61) == pytest.approx(values[60], abs=1e-6)
+    assert value_at(ours, "anger_blood", 61) == pytest.approx(performance.controls["anger_blood"][1][60], abs=1e-6)
 
 
 def test_operator_at_the_rate_of_the_scene(rig, take):

@@ -93,6 +93,12 @@ def test_doubled_timecodes_are_merged_where_few_and_spread_where_all(tmp_path, k
     np.testing.assert_allclose(take.seconds, frames / 60, atol=1e-9)
 
 
+def test_a_slow_recording_under_a_fast_timecode_has_no_losses(tmp_path, keys):
+    take = read_take(write_live_link(tmp_path / "a.csv", 2 * np.arange(600), keys, rate=60))
+    assert take.fps == 30.0 and take.notes == []
+    np.testing.assert_allclose(take.seconds, np.arange(600) / 30, atol=1e-9)
+
+
 def test_midnight_and_rows_a_little_out_of_order(tmp_path, keys):
     frames = np.arange(600)
     take = read_take(write_live_link(tmp_path / "a.csv", frames, keys, start=24 * 3600 * 60 - 200))
@@ -187,6 +193,7 @@ def cell(line, column, text):
         (cell(7, "JawOpen", "-0.5"), r"line 7: JawOpen: -0.5 is outside 0 to 1"),
         (cell(7, "BlendshapeCount", "52"), r"line 7: BlendshapeCount: 52, but the header names 61 values"),
         (cell(7, "Timecode", "00:00:01"), r"line 7: Timecode: '00:00:01' is not HH:MM:SS:FF"),
+        (cell(7, "Timecode", "00:00:01.250"), r"line 7: Timecode: '00:00:01.250' is not HH:MM:SS:FF"),
         (cell(7, "Timecode", "00:61:01:02"), r"line 7: Timecode: '00:61:01:02': hours go to 23"),
         (cell(7, "Timecode", "00:10:01:02"), r"line 8: time runs back .* split the takes"),
         (cell(1, "JawOpen", "JawAjar"), r"line 1: jawOpen: missing, all 52 blend shapes"),
