@@ -34,7 +34,7 @@ from .errors import InputError, nearest
 from .facs import EMOTION_CONTROLS
 from .files import atomic, read_toml, validate
 from .parameters import PARAMETERS, default_skin, skin_rows
-from .resources import Row, rigs_path
+from .resources import Row
 
 FORMAT = 1
 FINGER = "finger"
@@ -283,8 +283,8 @@ def _rounded(value: float) -> float:
 def write_profile(path: str | os.PathLike[str], profile: Profile) -> None:
     """Whole or not at all."""
     lines = [
-        "# Changes of blood that were measured, written by `sanguine physiology`; for those of rigs/blood.toml.",
-        "# low and high are 95 % intervals. docs/physiology.md says how indices became units, and what they replace.",
+        "# Changes of blood that were measured, written by `sanguine physiology`: rows of rigs/blood.toml with 95 % intervals.",
+        "# docs/physiology.md says how indices became units, and which rows of the table these replace.",
         f"format = {profile.format}",
         f"sanguine = {_text(profile.sanguine)}",
         f"sex = {_text(profile.sex)}",

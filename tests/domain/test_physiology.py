@@ -119,6 +119,21 @@ def test_the_lag_is_found_and_not_invented():
     assert sum(found) <= 3
 
 
+def test_noisy_people_do_not_decide_the_lag():
+    """Ten people whose pulse is measured well and five with ten times the noise: the ten say when it begins."""
+    answers = {("pulse", emotion): Answer(8.0, 8.0, 3.0, 3.0) for emotion in ("anger", "fear")}
+    off = []
+    for seed in range(20):
+        tracks = []
+        for women, noise in ((10, 1.0), (5, 10.0)):
+            signal = dataclasses.replace(PULSE, noise=noise, lag_s=8.0)
+            design = Design(women=women, men=0, signals={"pulse": signal}, answers=answers)
+            for track in simulate(design, [5, seed]).tracks:
+                tracks.append(dataclasses.replace(track, subject=f"{track.subject} {noise:g}"))
+        off.append(estimate_lag([clean(track) for track in tracks]).value_s - 8.0)
+    assert np.max(np.abs(off)) <= 2.0 and np.mean(np.abs(off)) <= 0.5  # of samples that are two seconds apart
+
+
 def test_more_samples_are_not_more_subjects():
     """The same six people sampled four times as often: the interval does not shrink, for people differ, not samples."""
     width = []
@@ -147,14 +162,15 @@ def test_effect_sizes_cover(n):
     assert abs(np.mean(held_g) - 0.8) <= 3.0 * np.std(held_g) / np.sqrt(studies)
 
 
-def test_differences_of_unequal_groups_cover():
+@pytest.mark.parametrize("shift", [0.3, 3.0])
+def test_differences_of_unequal_groups_cover(shift):
     random = np.random.default_rng(5)
     studies, interval, effect = 400, 0, 0
     for _ in range(studies):
-        a, b = 0.3 + 0.5 * random.standard_normal(8), 1.5 * random.standard_normal(20)
+        a, b = shift + 0.5 * random.standard_normal(8), 1.5 * random.standard_normal(20)
         estimate, d = st.difference_interval(a, b), st.difference_effect(a, b)
-        interval += estimate.low <= 0.3 <= estimate.high
-        effect += d.low <= 0.3 / np.sqrt((0.5**2 + 1.5**2) / 2.0) <= d.high
+        interval += estimate.low <= shift <= estimate.high
+        effect += d.low <= shift / np.sqrt((0.5**2 + 1.5**2) / 2.0) <= d.high
     assert abs(interval / studies - 0.95) <= coverage_error(studies)
     assert effect / studies >= 0.95 - coverage_error(studies)
 
