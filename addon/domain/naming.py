@@ -282,7 +282,7 @@ class Recogniser:
     def _add(self, name: str, entry: _Entry) -> None:
         words = _words(name)
         self._forms.setdefault(_joined(words), []).append(entry)
-        self._ends.update(words)  # a single side may stand anywhere
+        self._ends.add(_last_word(words))
         for left, right in (("left", "right"), ("l", "r")):
             text = "".join({LEFT: left, RIGHT: right}.get(word, word) for word in words)
             if len(text) >= _SQUASHED_LETTERS:
@@ -381,7 +381,7 @@ class Recogniser:
                 found[key] = (2, entries)
             elif entries := self._after_prefix(bare, words):
                 found[key] = (2, entries)
-            elif not self._ends.isdisjoint(words[-1:]) and (hit := self._inside(bare)):
+            elif _last_word(words) in self._ends and (hit := self._inside(bare)):
                 prefix, rest, entries = hit
                 if sum(map(str.isalpha, rest)) >= _STRONG_LETTERS:
                     found[key] = (3, entries)
@@ -425,6 +425,11 @@ class Recogniser:
             for a in range(len(parts))
             for b in range(a + 1, len(parts) + 1)
         )
+
+
+def _last_word(words: list[str]) -> str:
+    """The last one that is no side, as a side may stand anywhere."""
+    return next((word for word in reversed(words) if word not in (LEFT, RIGHT)), "")
 
 
 def _words_after(words: list[str], prefix: str) -> list[str]:

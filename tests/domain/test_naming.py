@@ -309,7 +309,7 @@ def test_no_list_of_names_breaks_it_or_is_mapped_to_nonsense(keys):
 
 
 def test_a_thousand_keys_are_quick():
-    """20 ms for 1000 keys was asked for; the least of ten, as others work on the machine."""
+    """20 ms for 1000 keys was asked for; the least of ten, and time of this thread alone, as others work on the machine."""
     keys = [f"body_part_{i}_left" for i in range(800)] + [f"head_{key}" for key in ARKIT.keys] + METAHUMAN + CC4
     recognise(keys)
     least = min(_seconds(keys) for _ in range(10))
@@ -317,9 +317,9 @@ def test_a_thousand_keys_are_quick():
 
 
 def _seconds(keys):
-    start = time.perf_counter()
+    start = time.thread_time()
     recognise(keys)
-    return time.perf_counter() - start
+    return time.thread_time() - start
 
 
 OWN = """
