@@ -6,8 +6,9 @@ import bpy
 
 from ..domain.blood import STATES
 from ..domain.facs import EMOTION_CONTROLS, EMOTIONS
+from ..domain.profile import read_profile
 from .bake import RECORD, bake_blood, bake_state, clear_bake
-from .blood import blood_properties, drive_settled, remove_blood_drivers
+from .blood import blood_properties, drive_settled, remove_blood_drivers, set_profile
 from .controls import CONTROL_BONE, OPTIONAL, add_controls, drive_shape_keys, remove_emotion
 from .operators import active_face, controls_of, emotion_bone, may_change
 from .poses import add_poses
@@ -173,6 +174,42 @@ class SANGUINE_OT_clear_blood(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SANGUINE_OT_load_profile(bpy.types.Operator):
+    bl_idname = "sanguine.load_profile"
+    bl_label = "Load Blood Profile"
+    bl_description = (
+        "Let the face's blood follow what was measured: a profile of `sanguine physiology`. It is kept in the rig. "
+        "Without a file, the blood is that of the built-in table again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _needs_controls(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        rig, face = rig_of(context), active_face(context)
+        try:
+            profile = read_profile(bpy.path.abspath(self.filepath)) if self.filepath else None
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        set_profile(rig, profile)
+        if RECORD not in face:  # baked blood turns stale, and shows it
+            remove_blood_drivers(face)
+            drive_settled(rig, face, blood_properties(face))
+        told = f"{len(profile.rows)} measured changes of {profile.subjects} subjects" if profile else "The built-in table"
+        self.report({"INFO"}, f"{told}. Apply the skin, so that its colours reach as far")
+        return {"FINISHED"}
+
+
 class SANGUINE_OT_add_poses(bpy.types.Operator):
     bl_idname = "sanguine.add_poses"
     bl_label = "Add Poses of Emotions"
@@ -194,5 +231,6 @@ CLASSES = (
     SANGUINE_OT_remove_feeling,
     SANGUINE_OT_bake_blood,
     SANGUINE_OT_clear_blood,
+    SANGUINE_OT_load_profile,
     SANGUINE_OT_add_poses,
 )

@@ -14,10 +14,12 @@ from .animation import (
     SANGUINE_OT_add_poses,
     SANGUINE_OT_bake_blood,
     SANGUINE_OT_clear_blood,
+    SANGUINE_OT_load_profile,
     SANGUINE_OT_remove_feeling,
     rig_of,
 )
 from .bake import bake_state
+from .blood import PROFILE
 from .capture import SANGUINE_OT_import_capture
 from .controls import CONTROL_BONE, OPTIONAL
 from .operators import (
@@ -95,6 +97,9 @@ class SANGUINE_PT_time(_FacePanel, bpy.types.Panel):
         layout.operator(SANGUINE_OT_bake_blood.bl_idname, icon="FCURVE")
         layout.operator(SANGUINE_OT_clear_blood.bl_idname, icon="X")
         layout.operator(SANGUINE_OT_add_poses.bl_idname, icon="ASSET_MANAGER")
+        layout.operator(SANGUINE_OT_load_profile.bl_idname, icon="FILE_FOLDER")
+        if PROFILE in rig:
+            layout.label(text="Measured blood, of a profile")
         bone = rig.pose.bones[CONTROL_BONE]
         moods = [name + MOOD_SUFFIX for name in EMOTION_CONTROLS if name + MOOD_SUFFIX in bone]
         column = layout.column(align=True)

@@ -147,3 +147,41 @@ def test_every_step_can_be_undone(face):
     bpy.ops.ed.redo()
     face = bpy.data.objects[face_name]
     assert RECORD in face and np.any([curve.evaluate(40) for curve in curves(face)])
+
+
+PROFILE = """
+format = 1
+sanguine = "0.1.0"
+sex = "pooled"
+subjects = 12
+[calibration]
+[[recording]]
+file = "study.csv"
+sha256 = "{sha}"
+samples = 100
+[[emotion]]
+name = "anger"
+change = [{{ region = "cheeks", quantity = "hemoglobin", value = 0.005, low = 0.003, high = 0.007, magnitude = "measured", source = ["study.csv"] }}]
+"""
+
+
+def test_measured_blood_takes_the_place_of_the_tables(face, tmp_path):
+    path = tmp_path / "profile.toml"
+    path.write_text(PROFILE.format(sha="0" * 64))
+    bpy.ops.sanguine.apply_skin()
+    controls.set_controls(face.parent, {"anger": 1.0})
+    bpy.context.view_layer.update()
+    table = {name: face[name] for name in ("blood_hemoglobin_cheeks", "blood_hemoglobin_ears")}
+    assert bpy.ops.sanguine.load_profile(filepath=str(path)) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert face["blood_hemoglobin_cheeks"] == pytest.approx(0.005) != table["blood_hemoglobin_cheeks"]
+    assert face["blood_hemoglobin_ears"] == table["blood_hemoglobin_ears"]
+    key(face, "anger", f1=1.0, f2=1.0)
+    bpy.ops.sanguine.bake_blood()
+    bpy.context.scene.frame_set(100)
+    assert face["blood_hemoglobin_cheeks"] == pytest.approx(0.005)
+    assert bpy.ops.sanguine.load_profile(filepath="") == {"FINISHED"}
+    assert any("Stale" in line for line in draw(panels.SANGUINE_PT_time))
+    path.write_text(path.read_text().replace("cheeks", "cheek"))
+    with pytest.raises(RuntimeError, match="did you mean 'cheeks'"):
+        bpy.ops.sanguine.load_profile(filepath=str(path))
