@@ -105,7 +105,7 @@ class SANGUINE_OT_remove_feeling(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         rig, face, name = rig_of(context), active_face(context), self.feeling
         try:
-            clear_bake(face, rig)
+            clear_bake(face)
             remove_emotion(rig, name)
             drive_shape_keys(rig, [child for child in rig.children if child.type == "MESH"])
         except ValueError as error:
@@ -170,7 +170,7 @@ class SANGUINE_OT_clear_blood(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        clear_bake(active_face(context), rig_of(context))
+        clear_bake(active_face(context))
         return {"FINISHED"}
 
 

@@ -1,7 +1,7 @@
 """Bake Blood: the blood of an animated face in time, as ordinary F-curves on its skin.
 
 What blood remembers fits in no driver, so the viewport shows the settled answer until the blood is baked. The curves
-take the drivers' place: they play and render anywhere, without the add-on, each frame for itself. What they were
+stand in for the drivers, which are muted: they play and render anywhere, without the add-on, each frame for itself. What they were
 computed from is kept as a fingerprint, so that a later change of the animation shows.
 """
 
@@ -20,7 +20,7 @@ from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, 
 from ..domain.effects import pressure
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
-from .blood import blood_model, blood_properties, blood_sliders, drive_settled, remove_blood_drivers
+from .blood import blood_model, blood_properties, blood_sliders, mute_blood
 from .controls import CONTROL_BONE
 from .curves import action_curve, curves, ensure_action, remove_curve, set_keys
 
@@ -64,7 +64,7 @@ def bake_blood(
 def write_blood(face: bpy.types.Object, frames: np.ndarray, changes: Mapping[str, np.ndarray]) -> None:
     """Puts the changes, by property, on the face as curves, in the place of its drivers. What does not change gets none."""
     ensure_action(face, f"{face.name} blood")
-    remove_blood_drivers(face)
+    mute_blood(face, True)
     for name in blood_properties(face):
         path = f'["{name}"]'
         remove_curve(face, path)
@@ -73,13 +73,12 @@ def write_blood(face: bpy.types.Object, frames: np.ndarray, changes: Mapping[str
             set_keys(action_curve(face, path, group="Blood"), *_without_still(frames, series))
 
 
-def clear_bake(face: bpy.types.Object, armature: bpy.types.Object | None = None) -> None:
-    """Takes the curves away and lets the drivers, if there is a rig, give the settled answer again."""
+def clear_bake(face: bpy.types.Object) -> None:
+    """Takes the curves away and lets the drivers give the settled answer again."""
     if RECORD not in face:
         return
     del face[RECORD]
-    names = blood_properties(face)
-    for name in names:
+    for name in blood_properties(face):
         remove_curve(face, f'["{name}"]')
         face[name] = 0.0
     animation = face.animation_data
@@ -88,8 +87,8 @@ def clear_bake(face: bpy.types.Object, armature: bpy.types.Object | None = None)
         animation.action = None
         if not action.users or (action.users == 1 and action.use_fake_user):
             bpy.data.actions.remove(action)
-    if armature is not None:
-        drive_settled(armature, face, names)
+    mute_blood(face, False)
+    face.update_tag()
 
 
 def bake_state(face: bpy.types.Object, armature: bpy.types.Object, scene: bpy.types.Scene) -> BakeState:

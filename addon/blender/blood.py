@@ -84,6 +84,7 @@ def drive_blood(
         help = f"Change of {what} in the region {channel.region}, driven by the emotions"
         skin[name] = 0.0
         describe(skin, name, help, *channel.reach, 0.0)
+        skin.property_overridable_library_set(f'["{name}"]', True)
         if len(driver_text(response)[0]) < MAX_EXPRESSION:
             drive(skin, f'["{name}"]', response, armature)
         else:
@@ -108,6 +109,7 @@ def drive_pressure(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
     """The same for what presses on the skin, live without the time that the blood takes to come back."""
     skin[pressure.PROPERTY] = 0.0
     describe(skin, pressure.PROPERTY, "How hard it presses, driven by the slider", 0.0, 1.0, 0.0)
+    skin.property_overridable_library_set(f'["{pressure.PROPERTY}"]', True)
     drive(skin, f'["{pressure.PROPERTY}"]', Response(((1.0, PRESSURE_CONTROL),)), armature)
 
 
@@ -119,6 +121,14 @@ def remove_blood(skin: bpy.types.Object) -> None:
     animation = skin.animation_data
     if animation and not (animation.drivers or animation.action or animation.nla_tracks):
         skin.animation_data_clear()
+
+
+def mute_blood(skin: bpy.types.Object, mute: bool) -> None:
+    """Silences the drivers of the blood, or lets them speak again; unlike a removal, a library override keeps this."""
+    ours = {f'["{name}"]' for name in _ours(skin)}
+    for curve in skin.animation_data.drivers if skin.animation_data else ():
+        if curve.data_path in ours:
+            curve.mute = mute
 
 
 def remove_blood_drivers(skin: bpy.types.Object) -> None:

@@ -67,7 +67,7 @@ def test_the_curves_are_the_model(face):
             # Blender stores keys in single precision: 6e-8 of values up to 0.1.
             assert value == pytest.approx(model[name][frame - 1] if name in model else 0.0, abs=2e-8), (name, frame)
     assert played(skin, 10)[CHEEKS] < 0.3 * settled({"anger": 1.0})["cheeks", "hemoglobin"]
-    assert not skin.animation_data.drivers
+    assert all(curve.mute for curve in skin.animation_data.drivers)
 
 
 def test_what_does_not_move_gets_no_curve(face):
@@ -157,17 +157,19 @@ def test_clearing_gives_the_drivers_back(face):
     armature, skin = face
     before = {curve.data_path: curve.driver.expression for curve in skin.animation_data.drivers}
     bake.bake_blood(skin, armature, bpy.context.scene)
-    bake.clear_bake(skin, armature)
+    bake.clear_bake(skin)
     assert {curve.data_path: curve.driver.expression for curve in skin.animation_data.drivers} == before
+    assert not any(curve.mute for curve in skin.animation_data.drivers)
     assert bake.RECORD not in skin and not curves(skin) and not [a for a in bpy.data.actions if "blood" in a.name]
-    controls.set_controls(armature, {"anger": 1.0})
+    bpy.context.scene.frame_set(20)
+    assert skin[CHEEKS] == pytest.approx(settled({"anger": 1.0})["cheeks", "hemoglobin"])
 
 
 def test_other_animation_of_the_skin_is_left_alone(face):
     armature, skin = face
     skin.keyframe_insert("location", frame=1)
     bake.bake_blood(skin, armature, bpy.context.scene)
-    bake.clear_bake(skin, armature)
+    bake.clear_bake(skin)
     assert {curve.data_path for curve in curves(skin)} == {"location"}
 
 
@@ -203,3 +205,44 @@ def test_a_baked_file_plays_any_frame_without_the_add_on(face, tmp_path):
     assert run.returncode == 0, run.stderr
     alone = float(next(line.split()[1] for line in run.stdout.splitlines() if line.startswith("VALUE")))
     assert alone == in_sequence[59]
+
+
+OVERRIDDEN = """
+    import bpy
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load({path!r}, link=True) as (found, wanted):
+        wanted.collections = ["face"]
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 60
+    override = wanted.collections[0].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    skin, armature = (next(o for o in override.all_objects if o.type == kind) for kind in ("MESH", "ARMATURE"))
+    from sanguine.blender import bake, curves
+    armature.animation_data.action = None  # of the library
+    curves.ensure_action(armature, "scene")
+    curves.set_keys(curves.action_curve(armature, 'pose.bones["sanguine"]["happy"]'), [1, 12], [0.0, 1.0])
+    bake.bake_blood(skin, armature, scene)
+    assert bake.bake_state(skin, armature, scene) == bake.BakeState(True, "")
+    bpy.ops.wm.save_as_mainfile(filepath={shot!r})
+    bpy.ops.wm.open_mainfile(filepath={shot!r})
+    bpy.context.scene.frame_set(60)
+    skin = next(o for o in bpy.data.objects if o.type == "MESH" and o.override_library)
+    print("VALUE", repr(skin["{name}"]))
+"""
+
+
+def test_a_linked_face_is_baked_on_its_override(face, tmp_path):
+    armature, skin = face
+    collection = bpy.data.collections.new("face")
+    bpy.context.scene.collection.children.link(collection)
+    for member in face:
+        bpy.context.scene.collection.objects.unlink(member)
+        collection.objects.link(member)
+    path = str(tmp_path / "face.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    script = textwrap.dedent(OVERRIDDEN).format(path=path, shot=str(tmp_path / "shot.blend"), name=CHEEKS)
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stderr
+    value = float(next(line.split()[1] for line in run.stdout.splitlines() if line.startswith("VALUE")))
+    happy = np.interp(np.arange(1, 61), [1, 12], [0.0, 1.0])
+    model = blood_over_time(Controls(np.arange(1, 61) / 24.0, {"happy": happy}))
+    assert value == pytest.approx(model["cheeks", "hemoglobin"][-1], abs=2e-8)
