@@ -81,7 +81,9 @@ def capture(
     head : whether the head's turns become units 51 to 56
     """
     for flag, value, low, high in (
-        ("--fps", fps, MIN_FPS, MAX_FPS), ("--smooth", smooth_s, 0.0, MAX_SMOOTH_S), ("--reduce", reduce, 0.0, 0.5),
+        ("--fps", fps, MIN_FPS, MAX_FPS),
+        ("--smooth", smooth_s, 0.0, MAX_SMOOTH_S),
+        ("--reduce", reduce, 0.0, 0.5),
     ):
         if not low <= value <= high:
             raise InputError(f"{flag}: {value:g} is outside {low:g} to {high:g}")
@@ -91,7 +93,9 @@ def capture(
     take = read_take(path, source_fps)
     for rate in (fps, take.fps):
         if frame_count(take.seconds, rate) > MAX_FRAMES:
-            raise InputError(f"{path}: {take.seconds[-1]:.0f} s at {rate:g} frames a second are more than {MAX_FRAMES} frames")
+            raise InputError(
+                f"{path}: {take.seconds[-1]:.0f} s at {rate:g} frames a second are more than {MAX_FRAMES} frames"
+            )
     return perform(take, fps, smooth_s, emotions, reduce, head)
 
 
@@ -127,8 +131,17 @@ def perform(
         peak_error = max(peak_error, float(values.max() - controls[name][1].max()) / float(values.max()))
     head_deg = {name: _keys(take.seconds, np.degrees(values), fps, 60 * reduce) for name, values in turned.items()}
     return Performance(
-        take.name, take.kind, take.fps, fps, frame_count(take.seconds, fps), float(take.seconds[-1]), controls,
-        head_deg, residual, peak_error, notes,
+        take.name,
+        take.kind,
+        take.fps,
+        fps,
+        frame_count(take.seconds, fps),
+        float(take.seconds[-1]),
+        controls,
+        head_deg,
+        residual,
+        peak_error,
+        notes,
     )
 
 

@@ -28,7 +28,8 @@ def import_performance(
     """Makes `performance` the action of `rig`, its first frame at `start`.
 
     Sliders that the rig lacks are added, but not on a library override, which forgets them on saving. Returns the
-    action and the controls that had to be left out. Raises ValueError where Blender cannot take it, with nothing changed.
+    action and the controls that had to be left out. Raises ValueError where Blender cannot take it, with nothing
+    changed.
     """
     if rig.library is not None:
         raise InputError(f"{rig.name}: linked from another file: make a library override of it first")
@@ -49,7 +50,7 @@ def import_performance(
 
 
 def _add_sliders(rig: bpy.types.Object, performance: Performance) -> None:
-    """Sides of units, and the blood of inferred emotions without their muscles, which the skins of the rig then hear."""
+    """Sides of units, and the blood of inferred emotions without their muscles, which the rig's skins then hear."""
     moods = [name for name in performance.controls if name.endswith(MOOD_SUFFIX)]
     new = [name for name in moods if name not in rig.pose.bones[CONTROL_BONE]]
     add_controls(rig, emotions_of(rig), moods)
@@ -83,8 +84,9 @@ class SANGUINE_OT_import_capture(bpy.types.Operator):
     bl_idname = "sanguine.import_capture"
     bl_label = "Import Capture"
     bl_description = (
-        "Make a recorded face (Live Link Face, OpenFace or MediaPipe CSV) the animation of the active face's controls: action "
-        "units, head and eyes, and the blood of the emotions that the face shows. Other animation is pushed down, not replaced"
+        "Make a recorded face (Live Link Face, OpenFace or MediaPipe CSV) the animation of the active face's controls: "
+        "action units, head and eyes, and the blood of the emotions that the face shows. Other animation is pushed "
+        "down, not replaced"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -92,20 +94,37 @@ class SANGUINE_OT_import_capture(bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.csv", options={"HIDDEN"})
     start: bpy.props.IntProperty(name="Start Frame", description="Where the take begins", default=1)
     smooth: bpy.props.FloatProperty(
-        name="Smoothing", description="Window in seconds; 0.1 takes a tracker's noise. There is no delay", min=0.0, max=2.0,
-        soft_max=0.5, default=0.0, step=1, precision=2,
+        name="Smoothing",
+        description="Window in seconds; 0.1 takes a tracker's noise. There is no delay",
+        min=0.0,
+        max=2.0,
+        soft_max=0.5,
+        default=0.0,
+        step=1,
+        precision=2,
     )
     reduce: bpy.props.FloatProperty(
-        name="Fewer Keys", description="Leave out keys as long as no value is off by more than this; 0 keys every frame",
-        min=0.0, max=0.5, soft_max=0.05, default=0.0, step=0.1, precision=3,
+        name="Fewer Keys",
+        description="Leave out keys as long as no value is off by more than this; 0 keys every frame",
+        min=0.0,
+        max=0.5,
+        soft_max=0.05,
+        default=0.0,
+        step=0.1,
+        precision=3,
     )
     emotions: bpy.props.BoolProperty(
-        name="Infer Emotions", description="Let the blood of the rig's emotions follow what the face shows", default=True
+        name="Infer Emotions",
+        description="Let the blood of the rig's emotions follow what the face shows",
+        default=True,
     )
     head: bpy.props.BoolProperty(name="Head", description="Turn the head too, by units 51 to 56", default=True)
     source_fps: bpy.props.FloatProperty(
-        name="Recorded at", description="Frames per second of a recording that does not tell the time; 0 finds out", min=0.0,
-        max=1000.0, default=0.0,
+        name="Recorded at",
+        description="Frames per second of a recording that does not tell the time; 0 finds out",
+        min=0.0,
+        max=1000.0,
+        default=0.0,
     )
 
     @classmethod
@@ -149,18 +168,24 @@ class SANGUINE_OT_import_capture(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         notes = list(performance.notes)
-        if performance.head_deg and self.head and not any('"].rotation_' in curve.data_path for curve in rig.animation_data.drivers):
+        if (
+            performance.head_deg
+            and self.head
+            and not any('"].rotation_' in curve.data_path for curve in rig.animation_data.drivers)
+        ):
             notes.append("the take turns the head, but the head's units move no bone of this rig")
         if left_out:
-            notes.append(f"{', '.join(left_out)}: left out, the linked rig has no such sliders: add them in its own file")
+            notes.append(
+                f"{', '.join(left_out)}: left out, the linked rig has no such sliders: add them in its own file"
+            )
         for note in notes:
             self.report({"INFO"}, note)
         felt = ", ".join(f"{name} {level:.2f}" for name, level in performance.emotions().items())
         self.report(
             {"INFO"},
-            f"{performance.name}: {performance.seconds:.1f} s at {performance.source_fps:g} frames a second on frames {self.start} "
-            f"to {self.start + performance.frames - 1}, {len(performance.controls)} controls, in {time.perf_counter() - began:.1f} s"
-            + (f"; the blood follows {felt}" if felt else ""),
+            f"{performance.name}: {performance.seconds:.1f} s at {performance.source_fps:g} frames a second on frames "
+            f"{self.start} to {self.start + performance.frames - 1}, {len(performance.controls)} controls, "
+            f"in {time.perf_counter() - began:.1f} s" + (f"; the blood follows {felt}" if felt else ""),
         )
         return {"FINISHED"}
 

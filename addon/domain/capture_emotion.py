@@ -27,7 +27,9 @@ UNREADABLE = {"arousal": "its open lips and heavy lids are those of anyone who s
 """Emotions that no recording of a face tells."""
 
 _SPEECH = frozenset("8 10 14 16 17 18 19 20 22 23 24 25 26 27 28 29 30 32 34".split())
-_NOT_FELT = frozenset("43 45 46 51 52 53 54 55 56 57 58 61 62 63 64 65 66".split())  # lids, head and gaze go everywhere in every mood
+_NOT_FELT = frozenset(
+    "43 45 46 51 52 53 54 55 56 57 58 61 62 63 64 65 66".split()
+)  # lids, head and gaze go everywhere in every mood
 _RATE_HZ = 20.0
 _UPPER_S, _SPEECH_S, _SPEECH_QUANTILE = 0.7, 1.2, 0.35
 _RESTING_FACE = 0.1  # at most this much of a unit is taken for how the face is at rest
@@ -49,6 +51,8 @@ def infer_emotions(
         return {}
     patterns = _face_patterns if any(name[-1] in "LR" for name in units) else _unit_patterns
     features = tuple(sorted(name for name in units if name[2:].rstrip("LR") not in _NOT_FELT))
+    if not features:
+        return {name: np.zeros(len(seconds)) for name in emotions}
     model = _Model(features, tuple(emotions), patterns)
     count = max(2, int(np.ceil(seconds[-1] * _RATE_HZ)) + 1)
     grid = np.arange(count) / _RATE_HZ
@@ -87,21 +91,25 @@ class _Model:
         self._full = np.array([row(name, 1.0) for name in emotions])
         # Faces of the table at known levels calibrate what the fit finds in them (its cost, and patterns that change
         # with the level, make it less or more).
-        found = np.array([self._mix(np.array([row(name, level) for level in _LEVELS]))[:, i] for i, name in enumerate(emotions)])
+        found = np.array(
+            [self._mix(np.array([row(name, level) for level in _LEVELS]))[:, i] for i, name in enumerate(emotions)]
+        )
         self._found = np.maximum.accumulate(found, axis=1)
 
     def levels(self, seen: np.ndarray) -> np.ndarray:
         """(T, E) slider levels, 0 to 1.5, for units (T, U)."""
         mix = self._mix(seen)
-        return np.column_stack(
-            [np.interp(mix[:, i], np.r_[0.0, found], (0.0, *_LEVELS)) for i, found in enumerate(self._found)]
-        )
+        levels = [np.interp(mix[:, i], np.r_[0.0, found], (0.0, *_LEVELS)) for i, found in enumerate(self._found)]
+        return np.where(mix > 0.0, np.column_stack(levels), 0.0)  # faint levels, too, may be found as nothing
 
     def _mix(self, seen: np.ndarray) -> np.ndarray:
         """(T, E) amounts of each full pattern: accelerated projected gradient on a convex, one-sided loss."""
         weighted = self._full * self._weights
-        step = 1.0 / np.linalg.eigvalsh(weighted @ self._full.T)[-1]
         mix = ahead = np.zeros((len(seen), len(self._full)))
+        steepest = np.linalg.eigvalsh(weighted @ self._full.T)[-1]
+        if steepest <= 0.0:  # none of these emotions has a unit that was recorded
+            return mix
+        step = 1.0 / steepest
         momentum = 1.0
         for _ in range(300):
             off = ahead @ self._full - seen
@@ -137,7 +145,10 @@ def _settled(levels: np.ndarray) -> np.ndarray:
 def _face_patterns(name: str, level: float) -> Mapping[str, float]:
     """What `units_of_keys` makes of the rig's own face: recordings of ARKit keys are seen through the same glasses."""
     keys = shape_key_values({name: level})
-    return {unit: float(values[0]) for unit, values in units_of_keys({k: np.array([v]) for k, v in keys.items()}).shown.items()}
+    return {
+        unit: float(values[0])
+        for unit, values in units_of_keys({k: np.array([v]) for k, v in keys.items()}).shown.items()
+    }
 
 
 @cache

@@ -143,7 +143,10 @@ def read_take(path: str | os.PathLike[str], source_fps: float | None = None) -> 
         )
     take.seconds = take.seconds - take.seconds[0]
     if not take.seconds[-1] <= MAX_SECONDS:
-        raise InputError(f"{path}: spans {take.seconds[-1] / 3600:.3g} hours, at most {MAX_SECONDS / 3600:g} are read: split the take")
+        raise InputError(
+            f"{path}: spans {take.seconds[-1] / 3600:.3g} hours, at most {MAX_SECONDS / 3600:g} are read: "
+            "split the take"
+        )
     return take
 
 
@@ -180,7 +183,11 @@ def _check_widths(table: _Table) -> None:
     for row, (line, cells) in enumerate(zip(table.lines, table.rows)):
         if len(cells) == width or (len(cells) > width and not any(cells[width:])):
             continue
-        end = ": the file ends in the middle of a row, remove it" if row == len(table.rows) - 1 and len(cells) < width else ""
+        end = (
+            ": the file ends in the middle of a row, remove it"
+            if row == len(table.rows) - 1 and len(cells) < width
+            else ""
+        )
         raise InputError(f"{table.path}: line {line}: {len(cells)} cells, the header has {width}{end}")
 
 
@@ -220,11 +227,15 @@ def _key_columns(table: _Table, optional: Iterable[str] = ()) -> dict[str, int]:
     for position, name in enumerate(table.header):
         key = _arkit_key(name)
         if key is not None and found.setdefault(key, position) != position:
-            raise InputError(f"{table.path}: line 1: {name}: the same blend shape as {table.header[found[key]]}, remove one")
+            raise InputError(
+                f"{table.path}: line 1: {name}: the same blend shape as {table.header[found[key]]}, remove one"
+            )
     missing = [key for key in ARKIT.keys if key not in found and key not in optional]
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-        raise InputError(f"{table.path}: line 1: {missing[0]}{more}: missing, all {len(ARKIT.keys)} blend shapes are needed")
+        raise InputError(
+            f"{table.path}: line 1: {missing[0]}{more}: missing, all {len(ARKIT.keys)} blend shapes are needed"
+        )
     return found
 
 
@@ -276,9 +287,7 @@ def _without_face(table: _Table, count: int, notes: list[str]) -> _Table:
 _TIMECODE = re.compile(r"(\d{1,2}):(\d{1,2}):(\d{1,2})([:;])(\d{1,3})(?:\.(\d{1,9}))?")
 
 
-def _timecodes(
-    table: _Table, position: int, source_fps: float | None, notes: list[str]
-) -> tuple[np.ndarray, float]:
+def _timecodes(table: _Table, position: int, source_fps: float | None, notes: list[str]) -> tuple[np.ndarray, float]:
     """Seconds and the rate of `HH:MM:SS:FF.mmm`: counts of frames, of which some rates skip a few a minute."""
     parts = np.empty((len(table.rows), 4))
     drop = False
@@ -297,7 +306,9 @@ def _timecodes(
         count = round(source_fps)  # 29.97 and 59.94 count to 30 and 60
     if parts[:, 3].max() >= count:
         row = int(parts[:, 3].argmax())
-        raise InputError(f"{table.where(row, table.header[position])}: frame {parts[row, 3]:g} at {count} frames a second")
+        raise InputError(
+            f"{table.where(row, table.header[position])}: frame {parts[row, 3]:g} at {count} frames a second"
+        )
     drop = drop or (count in (30, 60) and _skips_frames(parts, count))
     minutes = parts[:, 0] * 60 + parts[:, 1]
     frames = (minutes * 60 + parts[:, 2]) * count + parts[:, 3]
@@ -344,7 +355,9 @@ def _frames_per_second(parts: np.ndarray, notes: list[str]) -> int:
         if nearest >= at_least and abs(nearest - seen) <= 1.0:
             return nearest
     rate = next((rate for rate in rates if rate >= at_least), at_least)
-    notes.append(f"the timecode never turns a second over cleanly: {rate} frames a second is a guess, --source-fps says it")
+    notes.append(
+        f"the timecode never turns a second over cleanly: {rate} frames a second is a guess, --source-fps says it"
+    )
     return rate
 
 
@@ -416,7 +429,9 @@ def _tracked(table: _Table, columns: dict[str, int], notes: list[str]) -> _Table
     if "success" in columns:
         good &= table.numbers(columns["success"]) > 0
     if not good.any():
-        raise InputError(f"{table.path}: no row holds a face: success is 0 or confidence below {MIN_CONFIDENCE} throughout")
+        raise InputError(
+            f"{table.path}: no row holds a face: success is 0 or confidence below {MIN_CONFIDENCE} throughout"
+        )
     if not good.all():
         notes.append(f"{np.sum(~good)} frames that the tracker lost, left as gaps")
         return table.keep(np.flatnonzero(good).tolist())
@@ -426,8 +441,19 @@ def _tracked(table: _Table, columns: dict[str, int], notes: list[str]) -> _Table
 # MediaPipe and everything else that writes ARKit keys with a time
 
 
-_SECONDS = {"seconds": 1.0, "time_s": 1.0, "timestamp_s": 1.0, "time_sec": 1.0, "time_seconds": 1.0, "timestamp_sec": 1.0,
-            "time_ms": 1e-3, "timestamp_ms": 1e-3, "milliseconds": 1e-3, "timestamp_us": 1e-6, "time_us": 1e-6}
+_SECONDS = {
+    "seconds": 1.0,
+    "time_s": 1.0,
+    "timestamp_s": 1.0,
+    "time_sec": 1.0,
+    "time_seconds": 1.0,
+    "timestamp_sec": 1.0,
+    "time_ms": 1e-3,
+    "timestamp_ms": 1e-3,
+    "milliseconds": 1e-3,
+    "timestamp_us": 1e-6,
+    "time_us": 1e-6,
+}
 _CLOCKS = ("timestamp", "time", "t")
 _FRAMES = ("frame", "frame_idx", "frame_index", "frame_id", "frame_number", "frameindex", "framenumber")
 
@@ -457,7 +483,7 @@ def _clock(
     notes: list[str],
     unit: float | None,
 ) -> tuple[np.ndarray, float]:
-    """Seconds and rate, from the first column of `clocks`, else by counting frames. `unit` None: found from its steps."""
+    """Seconds and rate, from the first column of `clocks`, else by counting frames. `unit` None: from its steps."""
     clock = next((name for name in clocks if name in columns), None)
     if clock is not None:
         values = table.numbers(columns[clock])
@@ -475,7 +501,8 @@ def _clock(
             return np.zeros(1), 24.0
         has = f"{table.header[columns[clock]]} never advances" if clock else "no column tells the time"
         raise InputError(
-            f"{table.path}: line 1: {has}: needs {clocks[0]} ({'seconds' if unit == 1.0 else 'a time'}), or --source-fps"
+            f"{table.path}: line 1: {has}: "
+            f"needs {clocks[0]} ({'seconds' if unit == 1.0 else 'a time'}), or --source-fps"
         )
     frames = table.numbers(columns[counter]) if counter else np.arange(len(table.rows), dtype=float)
     return frames / source_fps, source_fps
@@ -483,9 +510,10 @@ def _clock(
 
 def _unit_of(step: float, clock: str, notes: list[str]) -> float:
     """Seconds in one tick of a clock of unknown unit: faces are filmed at 2 to 500 frames a second."""
-    unit = 1.0 if step <= 0.5 else 1e-3 if step <= 500.0 else 1e-6 if step <= 5e5 else 1e-9
-    notes.append(f"{clock}: steps of {step:g}, taken as {'s' if unit == 1 else 'ms' if unit == 1e-3 else 'µs' if unit == 1e-6 else 'ns'}")
-    return unit
+    most = {"s": 0.5, "ms": 500.0, "µs": 5e5, "ns": math.inf}
+    name = next(name for name in most if step <= most[name])
+    notes.append(f"{clock}: steps of {step:g}, taken as {name}")
+    return {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}[name]
 
 
 # Time
@@ -512,7 +540,9 @@ def _in_order(take: Take, table: _Table) -> Take:
         back = np.flatnonzero(np.diff(seconds) < -2.5 * frame)
         if len(back):
             line = table.lines[back[0] + 1]
-            raise InputError(f"{table.path}: line {line}: time runs back {-np.diff(seconds)[back[0]]:.3f} s: split the takes")
+            raise InputError(
+                f"{table.path}: line {line}: time runs back {-np.diff(seconds)[back[0]]:.3f} s: split the takes"
+            )
     order = np.argsort(seconds, kind="stable")
     ordered = seconds[order]
     # Rows nearer than a quarter of a frame are one frame seen twice.
@@ -533,7 +563,7 @@ def _in_order(take: Take, table: _Table) -> Take:
     lost = np.round(np.diff(take.seconds) / frame).astype(int) - 1
     if np.any(lost > 0):
         take.notes.append(
-            f"{lost[lost > 0].sum()} frames lost in {np.sum(lost > 0)} gaps, the longest {np.diff(take.seconds).max():.2f} s, "
-            "bridged by straight lines"
+            f"{lost[lost > 0].sum()} frames lost in {np.sum(lost > 0)} gaps, "
+            f"the longest {np.diff(take.seconds).max():.2f} s, bridged by straight lines"
         )
     return take

@@ -2,8 +2,8 @@
 
 The keys of a frame are a sum of units (`ACTION_UNITS[…].keys`), each 0 to 1. The inverse is a bounded least-squares
 problem per frame, solved for all frames at once. Some units share keys so closely that the data cannot tell them
-apart (23 is nearly a sum of 15, 18, 24 and 28; a jaw at 0.3 is 26 or 27); there the answer must not jump from one to the
-other. Two things keep it a continuous function of the keys, so that no flicker is made that was not recorded:
+apart (23 is nearly a sum of 15, 18, 24 and 28; a jaw at 0.3 is 26 or 27); there the answer must not jump from one to
+the other. Two things keep it a continuous function of the keys, so that no flicker is made that was not recorded:
 
 - a small quadratic penalty makes the problem strictly convex: among equals the evenest mix is taken;
 - units that are never the first guess (`_LATER`) get only what the others leave over.
@@ -76,7 +76,7 @@ def _columns() -> dict[str, np.ndarray]:
 
 
 def units_of_keys(keys: Mapping[str, np.ndarray]) -> Followed:
-    """The units behind recorded keys: key -> (N,) 0-1; keys not named are 0, names that are not ARKit's are left out."""
+    """The units behind recorded keys: key -> (N,) 0-1; keys not named are 0, other names are left out."""
     count = len(next(iter(keys.values())))
     recorded = np.zeros((count, len(ARKIT.keys)))
     for position, key in enumerate(ARKIT.keys):
@@ -109,7 +109,8 @@ def _before_fading(shown: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     values = dict(shown)
     for _ in range(4):
         values = {
-            part: np.minimum(seen / np.maximum(_left_over(part, values), _LEAST_LEFT), 1.0) for part, seen in shown.items()
+            part: np.minimum(seen / np.maximum(_left_over(part, values), _LEAST_LEFT), 1.0)
+            for part, seen in shown.items()
         }
     return values
 
@@ -120,10 +121,14 @@ def _left_over(part: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     left = np.ones_like(values[part])
     for row in UNIT_TABLE.interference:
         if unit in row.units and not row.keys and unit not in _REPLACES.values():
-            left = left * np.maximum(1.0 - sum(share * _beside(other, side, values) for other, share in row.by.items()), 0.0)
+            left = left * np.maximum(
+                1.0 - sum(share * _beside(other, side, values) for other, share in row.by.items()), 0.0
+            )
     for need in UNIT_TABLE.need:
         if unit == need.unit:
-            left = left * np.clip(sum(share * _beside(other, side, values) for other, share in need.of.items()), 0.0, 1.0)
+            left = left * np.clip(
+                sum(share * _beside(other, side, values) for other, share in need.of.items()), 0.0, 1.0
+            )
     return left
 
 
@@ -174,7 +179,9 @@ def units_of_head(head: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The head's turns, radians to the left, up and onto the left shoulder, as units 51 to 56."""
     found = {}
     for name, pair, field, sign in (
-        ("yaw", ("51", "52"), "turn_degrees", 1.0), ("pitch", ("53", "54"), "nod_degrees", -1.0), ("roll", ("55", "56"), "tilt_degrees", 1.0),
+        ("yaw", ("51", "52"), "turn_degrees", 1.0),
+        ("pitch", ("53", "54"), "nod_degrees", -1.0),
+        ("roll", ("55", "56"), "tilt_degrees", 1.0),
     ):
         for unit in pair if name in head else ():
             full = sign * getattr(ACTION_UNITS[unit].head, field)

@@ -28,13 +28,19 @@ def angry(tmp_path_factory):
     keys = noisy(add(showing("anger", 1.0, SECONDS, rng), talking(SECONDS, rng), blinking(SECONDS, rng)), SECONDS, rng)
     kept = np.delete(np.arange(len(SECONDS)), range(300, 318))
     path = tmp_path_factory.mktemp("take") / "angry.csv"
-    return write_live_link(path, kept, {key: values[kept] for key, values in keys.items()}, rotations={"HeadYaw": 0.2 * np.sin(SECONDS)}), keys
+    return write_live_link(
+        path, kept, {key: values[kept] for key, values in keys.items()}, rotations={"HeadYaw": 0.2 * np.sin(SECONDS)}
+    ), keys
 
 
 def test_a_take_becomes_curves_on_controls(angry):
     path, keys = angry
     performance = capture(path, 24.0)
-    assert (performance.source_fps, performance.fps, performance.frames) == (60.0, 24.0, 289)  # the last row is at 287.6
+    assert (performance.source_fps, performance.fps, performance.frames) == (
+        60.0,
+        24.0,
+        289,
+    )  # the last row is at 287.6
     units = set(performance.controls) - {"anger_blood"}
     assert units < set(UNIT_CONTROLS) and {"AU4L", "AU4R", "AU45L", "AU26"} <= units
     for frames, values in performance.controls.values():
@@ -88,8 +94,10 @@ def test_command(angry, tmp_path):
     curve = answer["controls"]["AU45L"]
     assert len(curve["frame"]) == len(curve["value"]) == answer["frames"]
     for wrong, message in (
-        (["--fps", "0.5"], "--fps: 0.5 is outside 1 to 240"), (["--smooth", "3"], "--smooth: 3 is outside 0 to 2"),
-        (["--emotions", "angr"], "--emotions: angr: no such emotion, did you mean 'anger'?"), (["--fps", "x"], "'x' is not a number"),
+        (["--fps", "0.5"], "--fps: 0.5 is outside 1 to 240"),
+        (["--smooth", "3"], "--smooth: 3 is outside 0 to 2"),
+        (["--emotions", "angr"], "--emotions: angr: no such emotion, did you mean 'anger'?"),
+        (["--fps", "x"], "'x' is not a number"),
     ):
         done = run(path, *wrong)
         assert done.returncode == 2 and done.stdout == "" and message in done.stderr and done.stderr.count("\n") == 1
@@ -101,7 +109,9 @@ def test_one_frame_is_a_pose(tmp_path):
     assert performance.frames == 1 and performance.controls["AU26"][1] == pytest.approx([1.0], abs=0.01)
 
 
-@pytest.mark.parametrize(("end", "message"), [(1e4, "are more than 500000 frames"), (1e6, "spans 278 hours"), (1e300, "1e\\+300 is no time")])
+@pytest.mark.parametrize(
+    ("end", "message"), [(1e4, "are more than 500000 frames"), (1e6, "spans 278 hours"), (1e300, "1e\\+300 is no time")]
+)
 def test_a_take_without_end_is_refused_before_it_costs_memory(tmp_path, end, message):
     keys = {key: np.zeros(2) for key in ARKIT.keys}
     path = write_mediapipe(tmp_path / "a.csv", np.array([0.0, end]), keys, "seconds")

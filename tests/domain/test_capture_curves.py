@@ -14,8 +14,10 @@ from sanguine.domain.facs import ACTION_UNITS, ARKIT, head_values, shape_key_val
 def lasting_peaks(seconds, values, fps):
     """Indices of maxima that nothing within one frame of `fps` tops."""
     return [
-        i for i in range(1, len(values) - 1)
-        if values[i] >= max(values[i - 1], values[i + 1]) and values[i] >= values[np.abs(seconds - seconds[i]) <= 1 / fps].max()
+        i
+        for i in range(1, len(values) - 1)
+        if values[i] >= max(values[i - 1], values[i + 1])
+        and values[i] >= values[np.abs(seconds - seconds[i]) <= 1 / fps].max()
     ]
 
 
@@ -28,8 +30,11 @@ def held(seconds, values, fps, at):
 
 @settings(max_examples=200)
 @given(
-    start=st.floats(1.0, 2.0), length=st.floats(0.1, 0.15), height=st.floats(0.1, 1.0),
-    rate=st.sampled_from([29.97, 30.0, 59.94, 60.0]), fps=st.sampled_from([24.0, 25.0, 30.0]),
+    start=st.floats(1.0, 2.0),
+    length=st.floats(0.1, 0.15),
+    height=st.floats(0.1, 1.0),
+    rate=st.sampled_from([29.97, 30.0, 59.94, 60.0]),
+    fps=st.sampled_from([24.0, 25.0, 30.0]),
 )
 def test_a_blink_of_any_phase_keeps_its_height(start, length, height, rate, fps):
     seconds = np.arange(int(4 * rate)) / rate
@@ -51,9 +56,14 @@ def test_point_samples_would_not_hold_blinks():
 
 
 @settings(max_examples=100)
-@given(seed=st.integers(0, 2**32 - 1), cutoff=st.floats(1.0, 30.0), drop=st.floats(0.0, 0.3), fps=st.sampled_from([24.0, 25.0, 30.0]))
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    cutoff=st.floats(1.0, 30.0),
+    drop=st.floats(0.0, 0.3),
+    fps=st.sampled_from([24.0, 25.0, 30.0]),
+)
 def test_random_curves_keep_every_peak_within_two_percent(seed, cutoff, drop, fps):
-    """Noise up to the recording's own limit, frames lost at random: each peak that stands out, not the highest alone."""
+    """Noise up to the recording's own limit, frames lost at random: each peak, not the highest alone."""
     rng = np.random.default_rng(seed)
     spectrum = np.fft.rfft(rng.normal(size=600))
     spectrum[np.fft.rfftfreq(600, 1 / 60) > cutoff] = 0
@@ -105,9 +115,34 @@ def test_fewer_keys_stay_within_their_tolerance(seed, tolerance):
 # From keys to units
 
 ALONE = {
-    "1": 1.0, "2L": 0.7, "4R": 0.5, "5": 0.8, "6": 0.6, "7L": 0.9, "9": 0.4, "10L": 0.5, "12L": 0.9, "12R": 0.3, "14R": 0.6, "15": 0.7,
-    "16": 0.5, "17": 0.6, "18": 0.7, "20": 0.8, "22": 0.6, "26": 0.8, "27": 0.9, "28": 0.5, "29": 0.4, "30L": 0.6, "34": 0.7, "45R": 1.0,
-    "24L": 0.8, "25": 0.6, "61": 0.7, "64": 0.5,
+    "1": 1.0,
+    "2L": 0.7,
+    "4R": 0.5,
+    "5": 0.8,
+    "6": 0.6,
+    "7L": 0.9,
+    "9": 0.4,
+    "10L": 0.5,
+    "12L": 0.9,
+    "12R": 0.3,
+    "14R": 0.6,
+    "15": 0.7,
+    "16": 0.5,
+    "17": 0.6,
+    "18": 0.7,
+    "20": 0.8,
+    "22": 0.6,
+    "26": 0.8,
+    "27": 0.9,
+    "28": 0.5,
+    "29": 0.4,
+    "30L": 0.6,
+    "34": 0.7,
+    "45R": 1.0,
+    "24L": 0.8,
+    "25": 0.6,
+    "61": 0.7,
+    "64": 0.5,
 }
 
 
@@ -140,7 +175,7 @@ def test_a_jaw_falls_before_it_is_pulled():
 
 
 def test_units_that_share_keys_do_not_flicker():
-    """Noise of 0.01 on every key moves no unit by more than a few times that: nothing jumps from one unit to another."""
+    """Noise of 0.01 on every key moves no unit by more than a few times that: nothing jumps from unit to unit."""
     rng = np.random.default_rng(4)
     for emotion in ("anger", "happy", "sad", "fear"):
         face = shape_key_values({emotion: 1.0})

@@ -24,7 +24,9 @@ def confusion(level, missing, people=5, emotions=DEFAULT_EMOTIONS):
     for row, name in enumerate(emotions):
         for person in range(people):
             rng = np.random.default_rng([row, person, missing])
-            keys = add(showing(name, level, SECONDS, rng, missing=missing), talking(SECONDS, rng), blinking(SECONDS, rng))
+            keys = add(
+                showing(name, level, SECONDS, rng, missing=missing), talking(SECONDS, rng), blinking(SECONDS, rng)
+            )
             found = [values[HOLD].mean() for values in inferred(keys, rng, emotions).values()]
             levels[row] += found[row] / people
             counts[row, int(np.argmax(found)) if max(found) >= 0.1 else -1] += 1
@@ -61,7 +63,10 @@ def test_talking_and_blinking_are_no_emotion():
         assert max(values.max() for values in found.values()) < 0.05
 
 
-@pytest.mark.parametrize("units", [{"1": 1.0, "2": 1.0}, {"4": 1.0}, {"7": 1.0}, {"12": 1.0}, {"5": 1.0}, {"17": 1.0}, {"25": 1.0, "26": 1.0}])
+@pytest.mark.parametrize(
+    "units",
+    [{"1": 1.0, "2": 1.0}, {"4": 1.0}, {"7": 1.0}, {"12": 1.0}, {"5": 1.0}, {"17": 1.0}, {"25": 1.0, "26": 1.0}],
+)
 def test_one_movement_alone_is_no_emotion(units):
     rng = np.random.default_rng(7)
     face = shape_key_values({f"AU{unit}": value for unit, value in units.items()})
@@ -97,10 +102,23 @@ def test_openface_units_tell_it_as_well(emotion):
     """Its 17 units, both sides as one."""
     course = rise_and_fall(SECONDS, 3, 9)
     asked = emotion_units(emotion, 1.0)
-    units = {f"AU{int(u)}": course * max(asked.get(str(int(u)), 0.0), asked.get(f"{int(u)}L", 0.0)) for u in OPENFACE_UNITS}
+    units = {
+        f"AU{int(u)}": course * max(asked.get(str(int(u)), 0.0), asked.get(f"{int(u)}L", 0.0)) for u in OPENFACE_UNITS
+    }
     found = infer_emotions(SECONDS, units)
     means = {name: values[HOLD].mean() for name, values in found.items()}
     assert max(means, key=means.get) == emotion and means[emotion] > 0.7
+
+
+@pytest.mark.parametrize("units", [["AU45"], ["AU12"], ["AU45", "AU9", "AU61"]])
+def test_recordings_of_a_few_units_invent_nothing(units):
+    """A file with one unit: what cannot be seen is 0, never the most."""
+    course = rise_and_fall(SECONDS, 3, 9)
+    for level in (0.0, 0.05, 1.0):
+        found = infer_emotions(SECONDS, {name: level * course for name in units}, READABLE)
+        assert all(np.isfinite(values).all() for values in found.values())
+        if level < 0.1 or units == ["AU45"]:
+            assert max(values.max() for values in found.values()) == 0.0
 
 
 def test_nothing_asked_is_nothing_done():

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.captures import (
-    LIVE_LINK_NAMES, ROTATIONS, add, blinks, noisy, talking, timecode, write_live_link, write_mediapipe, write_openface,
+    LIVE_LINK_NAMES,
+    ROTATIONS,
+    add,
+    blinks,
+    noisy,
+    talking,
+    timecode,
+    write_live_link,
+    write_mediapipe,
+    write_openface,
 )
 
 from sanguine.domain.capture_files import _arkit_key, detected_rate, read_take
@@ -27,7 +36,13 @@ def keys():
 
 def test_live_link_face_is_read_as_it_was_recorded(tmp_path, keys):
     yaw = np.linspace(-0.3, 0.3, 600)
-    path = write_live_link(tmp_path / "take_7_iPhone.csv", np.arange(600), keys, rotations={"HeadYaw": yaw, "HeadPitch": yaw}, start=5e6 + 0.207)
+    path = write_live_link(
+        tmp_path / "take_7_iPhone.csv",
+        np.arange(600),
+        keys,
+        rotations={"HeadYaw": yaw, "HeadPitch": yaw},
+        start=5e6 + 0.207,
+    )
     take = read_take(path)
     assert (take.name, take.kind, take.fps, take.units) == ("take_7_iPhone", "live_link_face", 60.0, {})
     np.testing.assert_allclose(take.seconds, np.arange(600) / 60, atol=2e-5)  # thousandths of a frame
@@ -50,7 +65,7 @@ def test_a_timecode_counts_in_the_rate_it_shows(tmp_path, keys, rate, fps):
 @pytest.mark.parametrize("rate", [30, 60])
 @pytest.mark.parametrize("marked", [True, False])
 def test_drop_frame_timecode_keeps_true_time(tmp_path, keys, rate, marked):
-    """Ten seconds over a full minute, where two (four) counts are left out: `;` says so, or the counts themselves do."""
+    """Ten seconds over a full minute, where two (four) counts are left out: `;` says so, or the counts do."""
     start = 55 * rate
     path = write_live_link(tmp_path / "a.csv", np.arange(600), keys, rate, drop=True, start=start)
     if not marked:
@@ -198,11 +213,17 @@ def cell(line, column, text):
         (cell(7, "Timecode", "00:10:01:02"), r"line 8: time runs back .* split the takes"),
         (cell(1, "JawOpen", "JawAjar"), r"line 1: jawOpen: missing, all 52 blend shapes"),
         (cell(1, "JawOpen", "JawLeft"), r"line 1: JawLeft: the same blend shape as|line 1: JawLeft: stands twice"),
-        (lambda lines: [*lines[:-1], lines[-1][:200]], r"line 21: \d+ cells, the header has 63: the file ends in the middle"),
+        (
+            lambda lines: [*lines[:-1], lines[-1][:200]],
+            r"line 21: \d+ cells, the header has 63: the file ends in the middle",
+        ),
         (lambda lines: [*lines[:5], lines[5] + ",0.1", *lines[6:]], r"line 6: 64 cells, the header has 63$"),
         (lambda lines: lines[:1], r"holds a header and no frames"),
         (lambda lines: ["a,b,c", "1,2,3"], r"line 1: no recording of a face that is known"),
-        (lambda lines: [line.split(",")[0] + ",0" if i else line for i, line in enumerate(lines)], r"no row holds a face"),
+        (
+            lambda lines: [line.split(",")[0] + ",0" if i else line for i, line in enumerate(lines)],
+            r"no row holds a face",
+        ),
         (lambda lines: ['"' + lines[0], *lines[1:]], r"not valid CSV|no recording|line 1"),
         (lambda lines: [lines[0].replace("Timecode", "Timecode\0"), *lines[1:]], r"zero bytes"),
     ],
@@ -232,10 +253,17 @@ def test_faults_of_the_other_formats(tmp_path, keys):
 
 
 @settings(max_examples=150)
-@given(st.lists(st.text(alphabet="0123456789:;.,-eEnaif \tAU_rc\"\r", max_size=40), max_size=6), st.sampled_from([
-    ",".join(("Timecode", "BlendshapeCount", *LIVE_LINK_NAMES, *ROTATIONS)), "frame, timestamp, confidence, success, AU01_r, AU12_r",
-    "timestamp_ms,_neutral," + ",".join(ARKIT.keys), "a,b",
-]))
+@given(
+    st.lists(st.text(alphabet='0123456789:;.,-eEnaif \tAU_rc"\r', max_size=40), max_size=6),
+    st.sampled_from(
+        [
+            ",".join(("Timecode", "BlendshapeCount", *LIVE_LINK_NAMES, *ROTATIONS)),
+            "frame, timestamp, confidence, success, AU01_r, AU12_r",
+            "timestamp_ms,_neutral," + ",".join(ARKIT.keys),
+            "a,b",
+        ]
+    ),
+)
 def test_no_file_of_any_kind_is_met_with_a_traceback(tmp_path_factory, rows, header):
     path = tmp_path_factory.mktemp("fuzz") / "a.csv"
     path.write_text("\n".join([header, *rows]), encoding="utf-8")

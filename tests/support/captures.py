@@ -1,4 +1,4 @@
-"""Recorded faces made to measure: performances with known truth, and the CSV files that recorders would write of them."""
+"""Recorded faces made to measure: performances with known truth, and the CSV files recorders would write of them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ from sanguine.domain.facs import ARKIT, EMOTION_MAX, emotion_units, shape_key_va
 
 # The order of the app's own files.
 LIVE_LINK_NAMES = (
-    "EyeBlinkLeft EyeLookDownLeft EyeLookInLeft EyeLookOutLeft EyeLookUpLeft EyeSquintLeft EyeWideLeft EyeBlinkRight "
-    "EyeLookDownRight EyeLookInRight EyeLookOutRight EyeLookUpRight EyeSquintRight EyeWideRight JawForward JawRight JawLeft "
-    "JawOpen MouthClose MouthFunnel MouthPucker MouthRight MouthLeft MouthSmileLeft MouthSmileRight MouthFrownLeft "
-    "MouthFrownRight MouthDimpleLeft MouthDimpleRight MouthStretchLeft MouthStretchRight MouthRollLower MouthRollUpper "
-    "MouthShrugLower MouthShrugUpper MouthPressLeft MouthPressRight MouthLowerDownLeft MouthLowerDownRight MouthUpperUpLeft "
-    "MouthUpperUpRight BrowDownLeft BrowDownRight BrowInnerUp BrowOuterUpLeft BrowOuterUpRight CheekPuff CheekSquintLeft "
-    "CheekSquintRight NoseSneerLeft NoseSneerRight TongueOut"
+    "EyeBlinkLeft EyeLookDownLeft EyeLookInLeft EyeLookOutLeft EyeLookUpLeft EyeSquintLeft EyeWideLeft "
+    "EyeBlinkRight EyeLookDownRight EyeLookInRight EyeLookOutRight EyeLookUpRight EyeSquintRight EyeWideRight "
+    "JawForward JawRight JawLeft JawOpen MouthClose MouthFunnel MouthPucker MouthRight MouthLeft MouthSmileLeft "
+    "MouthSmileRight MouthFrownLeft MouthFrownRight MouthDimpleLeft MouthDimpleRight MouthStretchLeft "
+    "MouthStretchRight MouthRollLower MouthRollUpper MouthShrugLower MouthShrugUpper MouthPressLeft "
+    "MouthPressRight MouthLowerDownLeft MouthLowerDownRight MouthUpperUpLeft MouthUpperUpRight BrowDownLeft "
+    "BrowDownRight BrowInnerUp BrowOuterUpLeft BrowOuterUpRight CheekPuff CheekSquintLeft CheekSquintRight "
+    "NoseSneerLeft NoseSneerRight TongueOut"
 ).split()
-ROTATIONS = "HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll RightEyeYaw RightEyePitch RightEyeRoll".split()
+ROTATIONS = (
+    "HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll RightEyeYaw RightEyePitch RightEyeRoll".split()
+)
 OPENFACE_UNITS = "01 02 04 05 06 07 09 10 12 14 15 17 20 23 25 26 45".split()
 
 
@@ -50,9 +53,19 @@ def talking(seconds, rng, amount=1.0):
     phase = 2 * np.pi * np.cumsum(rng.uniform(3, 6, len(seconds))) * np.median(np.diff(seconds))
     keys = {}
     for name, size in (
-        ("jawOpen", 0.35), ("mouthFunnel", 0.3), ("mouthPucker", 0.35), ("mouthLowerDown", 0.3), ("mouthUpperUp", 0.2),
-        ("mouthClose", 0.15), ("mouthStretch", 0.15), ("mouthPress", 0.2), ("mouthShrugLower", 0.15), ("mouthRollLower", 0.15),
-        ("mouthSmile", 0.1), ("mouthDimple", 0.1), ("mouthShrugUpper", 0.1),
+        ("jawOpen", 0.35),
+        ("mouthFunnel", 0.3),
+        ("mouthPucker", 0.35),
+        ("mouthLowerDown", 0.3),
+        ("mouthUpperUp", 0.2),
+        ("mouthClose", 0.15),
+        ("mouthStretch", 0.15),
+        ("mouthPress", 0.2),
+        ("mouthShrugLower", 0.15),
+        ("mouthRollLower", 0.15),
+        ("mouthSmile", 0.1),
+        ("mouthDimple", 0.1),
+        ("mouthShrugUpper", 0.1),
     ):
         wave = np.maximum(np.sin(phase * rng.uniform(0.6, 1.1) + rng.uniform(0, 6)), 0) ** 1.5
         swell = np.interp(seconds, np.linspace(0, seconds[-1], 8), rng.uniform(0.5, 1, 8))
@@ -67,11 +80,15 @@ def talking(seconds, rng, amount=1.0):
 def showing(emotion, level, seconds, rng, start=3.0, stop=9.0, missing=0):
     """Keys of a face that shows an emotion from `start` to `stop`: an individual, each unit a quarter more or less than
     the table's, `missing` of them not there at all."""
-    gain = {unit: rng.uniform(0.75, 1.25) for unit in sorted({unit.rstrip("LR") for unit in emotion_units(emotion, 1.0)})}
+    gain = {
+        unit: rng.uniform(0.75, 1.25) for unit in sorted({unit.rstrip("LR") for unit in emotion_units(emotion, 1.0)})
+    }
     gain |= dict.fromkeys(rng.choice(sorted(gain), missing, replace=False), 0.0)
     levels = np.linspace(0, EMOTION_MAX, 13)
     faces = [
-        shape_key_values({f"AU{u}": min(1.0, v * gain.get(u.rstrip("LR"), 1.0)) for u, v in emotion_units(emotion, at).items()})
+        shape_key_values(
+            {f"AU{u}": min(1.0, v * gain.get(u.rstrip("LR"), 1.0)) for u, v in emotion_units(emotion, at).items()}
+        )
         for at in levels
     ]
     course = level * rise_and_fall(seconds, start, stop)
@@ -82,7 +99,9 @@ def blinking(seconds, rng):
     """Blinks as trackers see them: the lids, and a little of what is around them."""
     lids = blinks(seconds, rng)
     return {
-        f"{key}{side}": size * lids for key, size in (("eyeBlink", 1.0), ("eyeSquint", 0.3), ("browDown", 0.1)) for side in ("Left", "Right")
+        f"{key}{side}": size * lids
+        for key, size in (("eyeBlink", 1.0), ("eyeSquint", 0.3), ("browDown", 0.1))
+        for side in ("Left", "Right")
     }
 
 
@@ -111,7 +130,8 @@ def timecode(frame, rate=60, drop=False):
         tens, rest = divmod(whole, rate * 600 - 9 * skip)
         whole += 9 * skip * tens + (skip * ((rest - skip) // (rate * 60 - skip)) if rest >= skip else 0)
     seconds, frames = divmod(whole, rate)
-    return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{';' if drop else ':'}{frames:02d}.{int(part * 1000):03d}"
+    clock = f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+    return f"{clock}{';' if drop else ':'}{frames:02d}.{int(part * 1000):03d}"
 
 
 def write_live_link(path: Path, frames, keys, rate=60, drop=False, rotations=None, start=0):
@@ -119,7 +139,9 @@ def write_live_link(path: Path, frames, keys, rate=60, drop=False, rotations=Non
     lines = [",".join(("Timecode", "BlendshapeCount", *LIVE_LINK_NAMES, *ROTATIONS))]
     order = [name[0].lower() + name[1:] for name in LIVE_LINK_NAMES]
     for i, frame in enumerate(frames):
-        values = [keys[key][i] for key in order] + [(rotations or {}).get(name, np.zeros(i + 1))[i] for name in ROTATIONS]
+        values = [keys[key][i] for key in order] + [
+            (rotations or {}).get(name, np.zeros(i + 1))[i] for name in ROTATIONS
+        ]
         lines.append(",".join((timecode(start + frame, rate, drop), "61", *(f"{value:.10f}" for value in values))))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -142,10 +164,23 @@ def write_openface(path: Path, seconds, units, lost=(), pose=None, blanks=True):
     lines = [(", " if blanks else ",").join(columns)]
     for i, second in enumerate(seconds):
         gone = i in lost
-        turn = [(pose or {}).get(name, np.zeros(i + 1))[i] for name in ("gaze_angle_x", "gaze_angle_y", "pose_Rx", "pose_Ry", "pose_Rz")]
-        cells = [str(i + 1), "0", f"{second:.3f}", "0.00" if gone else "0.98", "0" if gone else "1", f"{turn[0]:.3f}", f"{turn[1]:.3f}"]
+        turn = [
+            (pose or {}).get(name, np.zeros(i + 1))[i]
+            for name in ("gaze_angle_x", "gaze_angle_y", "pose_Rx", "pose_Ry", "pose_Rz")
+        ]
+        cells = [
+            str(i + 1),
+            "0",
+            f"{second:.3f}",
+            "0.00" if gone else "0.98",
+            "0" if gone else "1",
+            f"{turn[0]:.3f}",
+            f"{turn[1]:.3f}",
+        ]
         cells += ["1.0", f"{turn[2]:.3f}", f"{turn[3]:.3f}", f"{turn[4]:.3f}"]
-        cells += ["0.00" if gone else f"{5 * units.get(str(int(u)), np.zeros(i + 1))[i]:.2f}" for u in OPENFACE_UNITS] + ["0.00", "0.00"]
+        cells += [
+            "0.00" if gone else f"{5 * units.get(str(int(u)), np.zeros(i + 1))[i]:.2f}" for u in OPENFACE_UNITS
+        ] + ["0.00", "0.00"]
         lines.append((", " if blanks else ",").join(cells))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
