@@ -16,7 +16,9 @@ from tests.blender.test_addon import draw, grid
 def face():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     sanguine.register()
-    yield grid()
+    made = grid()
+    made.sanguine.quality = "draft"
+    yield made
     sanguine.unregister()
 
 
