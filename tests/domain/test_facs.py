@@ -1,6 +1,8 @@
 """The FACS tables are whole and symmetric, and no mix of controls overdrives a face."""
 
+import importlib.util
 import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -291,3 +293,11 @@ def test_a_broken_emotion_table_says_what_to_mend(tmp_path, old, new, message):
     broken.write_text(rigs_path("emotions.toml").read_text().replace(old, new, 1))
     with pytest.raises(InputError, match=re.escape(message)):
         read_emotions(broken, ACTION_UNITS)
+
+
+def test_the_page_of_the_face_is_current():
+    root = Path(__file__).resolve().parents[2]
+    spec = importlib.util.spec_from_file_location("docs", root / "tools/write_facs_docs.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert (root / "docs/facs.md").read_text(encoding="utf-8") == module.page(), "run `make docs`"

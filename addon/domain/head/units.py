@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .package import ARKIT_NAMES
+from ..own_keys import Bump
+from .package import ARKIT_NAMES, swelling
 
 
 @dataclass(frozen=True)
@@ -15,12 +16,14 @@ class Mend:
 
     gain     : (mm from the midline, factor) pairs, applied to the whole displacement
     together : a point may go toward the midline by this share of its distance from it, no farther
+    bump     : added to it, given for the left side
     """
 
     unit: str
     gain: tuple[tuple[float, float], ...]
     together: float
     reason: str
+    bump: Bump | None = None
 
 
 MENDS = (
@@ -43,6 +46,14 @@ MENDS = (
         0.2,
         "draws the brows together as well; with browDown the skin between them folded over itself.",
     ),
+    Mend(
+        "cheekSquint",
+        ((0, 1.0),),
+        1.0,
+        "as sculpted the skin under the lid slides up along its slope into the eyeball, which came out through it beside "
+        "eyeSquint. The muscle that lifts it swells as it contracts.",
+        Bump(center=(42.0, -137.0, 713.0), radius_mm=9.0, move_mm=(0.4, -1.5, 0.0)),
+    ),
 )
 
 
@@ -55,6 +66,9 @@ def mend(units: np.ndarray, base: np.ndarray) -> None:
             if name.removesuffix("Left").removesuffix("Right") == row.unit:
                 move = units[ARKIT_NAMES.index(name)]
                 move *= factor[:, None]
+                if row.bump is not None:
+                    flip = np.float32([-1, 1, 1]) if name.endswith("Right") else np.float32([1, 1, 1])
+                    move += swelling(row.bump, base * flip) * flip
                 inward = -np.sign(base[:, 0]) * move[:, 0]
                 limit = row.together * np.abs(base[:, 0])
                 # Half the limit is free; beyond it the way inward approaches the limit and never reaches it.
