@@ -50,6 +50,15 @@ def _parser() -> argparse.ArgumentParser:
                       help="nm, a range or a list with commas (default %(default)s)")
     skin.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
 
+    blood = _verb(verbs, "blood", _blood, "what emotions and states of the body do to the blood and the colour of a skin")
+    whose = blood.add_mutually_exclusive_group()
+    whose.add_argument("--tone", metavar="LABEL", help="a person of this tone: fitzpatrick-2, monk-9, ita:35, … "
+                       "(without it a light, a tan, a brown and a dark skin)")
+    whose.add_argument("--skin", metavar="SKIN.json", help="skins, as of the verb skin")
+    blood.add_argument("--blood", type=_number, default=1.0, metavar="X",
+                       help="the slider: 1 as in life, above that exaggerated, at most 2 (default %(default)s)")
+    blood.add_argument("--out", metavar="FILE", help="write the JSON there instead of to standard output")
+
     solve = _verb(verbs, "solve", _solve, "what becomes of light in stacks of layers, by a solver of your choice")
     solve.add_argument("cases", metavar="CASES.json")
     solve.add_argument("--solver", default="auto", metavar="NAME",
@@ -222,6 +231,13 @@ def _skin(options: argparse.Namespace) -> int:
     wavelengths_nm = _wavelengths(options.wavelengths)
     ids, skins = read_skins(options.skins)
     _answer(report(ids, skins, wavelengths_nm), options.out)
+    return 0
+
+
+def _blood(options: argparse.Namespace) -> int:
+    from ..app.blood_report import asked_skins, report
+
+    _answer(report(asked_skins(options.tone, options.skin), options.blood), options.out)
     return 0
 
 

@@ -214,7 +214,7 @@ def _person(tone: str, growth: Growth) -> Person:
         skin[name] = min(max(traits[name], PARAMETERS[name].hard_min), PARAMETERS[name].hard_max)
     effects = {effect.id for effect in EFFECTS if effect.default_strength is not None}
     strengths = {name: value for name, value in traits.items() if name in effects and value > 0.0}
-    skin["melanin"] = _melanin_for(skin, ita)
+    skin["melanin"] = melanin_for(skin, ita)
     # Six digits hide the last bits, in which mathematical libraries differ.
     return Person(tone, ita, {k: float(f"{v:.6g}") for k, v in skin.items()}, strengths, growth)
 
@@ -270,7 +270,7 @@ def _from_scale(scale: str, value: float) -> float:
             return value
 
 
-def _melanin_for(skin: Skin, ita: float) -> float:
+def melanin_for(skin: Skin, ita: float) -> float:
     """The melanin with which the face, all else being as in `skin`, has this ITA; the nearest there is."""
     row = PARAMETERS["melanin"]
     low, high = math.log(5e-4), math.log(row.hard_max)

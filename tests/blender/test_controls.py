@@ -156,8 +156,8 @@ def test_an_emotion_costs_nothing_before_it_is_on_the_rig_and_leaves_nothing_beh
     with pytest.raises(InputError, match="fear: not on this rig"):
         controls.set_controls(armature, {"fear": 1.0})
     controls.set_controls(armature, {"fear": 0.0})
-    with pytest.raises(InputError, match="feer: no such emotion or state, did you mean 'fear'"):
-        controls.add_controls(armature, ["feer"])
+    with pytest.raises(InputError, match="fea: no such emotion or state, did you mean 'fear'"):
+        controls.add_controls(armature, ["fea"])
 
 
 def test_a_rig_without_sides_has_neither_their_sliders_nor_their_drivers():
