@@ -1,8 +1,8 @@
 """Bake Blood: the blood of an animated face in time, as ordinary F-curves on its skin.
 
 What blood remembers fits in no driver, so the viewport shows the settled answer until the blood is baked. The curves
-stand in for the drivers, which are muted: they play and render anywhere, without the add-on, each frame for itself. What they were
-computed from is kept as a fingerprint, so that a later change of the animation shows.
+stand in for the drivers, which are muted: they play and render anywhere, without the add-on, each frame for itself.
+What they were computed from is kept as a fingerprint, so that a later change of the animation shows.
 """
 
 from __future__ import annotations
@@ -16,16 +16,19 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, blood_property
+from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, blood_property
 from ..domain.effects import pressure
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
-from .blood import blood_model, blood_properties, blood_sliders, mute_blood
+from .blood import PROFILE, blood_model, blood_properties, blood_sliders, mute_blood
 from .controls import CONTROL_BONE
 from .curves import action_curve, curves, ensure_action, remove_curve, set_keys
 
 RECORD = "sanguine_bake"
 """Custom property of a baked face: what was baked, and from what."""
+
+_TABLES = hashlib.sha256(repr((BLOOD, VASCULAR)).encode()).hexdigest()
+
 
 @dataclass(frozen=True)
 class BakeState:
@@ -114,8 +117,7 @@ def sample(
 
     The armature is evaluated alone, in a scene of its own: no mesh is deformed for this.
     """
-    names = [n for n in (*blood_sliders(armature), BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL)
-             if n in armature.pose.bones[CONTROL_BONE]]
+    names = _sliders(armature)
     values = np.empty((len(frames), len(names)))
     alone = bpy.data.scenes.new("sanguine bake")
     try:
@@ -137,17 +139,15 @@ def fingerprint(armature: bpy.types.Object, scene: bpy.types.Scene) -> str:
     bone = armature.pose.bones[CONTROL_BONE]
     animation = armature.animation_data
     animated = {curve.data_path for curve in _slider_curves(armature)}
-    still = {
-        name: float(bone[name])
-        for name in (*blood_sliders(armature), BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL)
-        if name in bone and f'pose.bones["{CONTROL_BONE}"]["{name}"]' not in animated and not _strips(animation)
-    }
+    strips = _strips(animation)
+    still = {name: float(bone[name]) for name in _sliders(armature) if not strips and _path(name) not in animated}
     what = [
-        hashlib.sha256(repr((blood_model(armature), VASCULAR)).encode()).hexdigest(),
+        _TABLES,
+        armature.get(PROFILE, ""),
         scene.render.fps / scene.render.fps_base,
         still,
         [_curve_print(curve) for curve in _slider_curves(armature)],
-        [_properties(strip) for strip in _strips(animation)],
+        [_properties(strip) for strip in strips],
         [_driver_print(curve) for curve in (animation.drivers if animation else ()) if CONTROL_BONE in curve.data_path],
     ]
     return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
@@ -160,9 +160,19 @@ def _range(armature: bpy.types.Object, scene: bpy.types.Scene) -> tuple[int, int
     return min([scene.frame_start, *(int(np.floor(frame)) for frame in keyed)]), scene.frame_end
 
 
+def _sliders(armature: bpy.types.Object) -> list[str]:
+    """What the blood depends on."""
+    bone = armature.pose.bones[CONTROL_BONE]
+    return [n for n in (*blood_sliders(armature), BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL) if n in bone]
+
+
+def _path(slider: str) -> str:
+    return f'pose.bones["{CONTROL_BONE}"]["{slider}"]'
+
+
 def _slider_curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
-    prefix = f'pose.bones["{CONTROL_BONE}"]["'
-    return [curve for curve in curves(armature) if curve.data_path.startswith(prefix) and len(curve.keyframe_points)]
+    paths = {_path(name) for name in _sliders(armature)}
+    return [curve for curve in curves(armature) if curve.data_path in paths and len(curve.keyframe_points)]
 
 
 def _strips(animation: bpy.types.AnimData | None) -> list[bpy.types.NlaStrip]:
@@ -171,11 +181,16 @@ def _strips(animation: bpy.types.AnimData | None) -> list[bpy.types.NlaStrip]:
 
 def _curve_print(curve: bpy.types.FCurve) -> list[Any]:
     points = curve.keyframe_points
-    numbers = np.empty((3, 2 * len(points)), np.float32)
-    for row, name in zip(numbers, ("co", "handle_left", "handle_right"), strict=True):
-        points.foreach_get(name, row)
-    kinds = [(point.interpolation, point.easing) for point in points]
-    return [curve.data_path, curve.mute, curve.extrapolation, numbers.tobytes().hex(), kinds,
+    digest = hashlib.sha256()
+    for name in ("co", "handle_left", "handle_right"):
+        numbers = np.empty(2 * len(points), np.float32)
+        points.foreach_get(name, numbers)
+        digest.update(numbers)
+    for name in ("interpolation", "easing"):
+        kinds = np.empty(len(points), np.int32)
+        points.foreach_get(name, kinds)
+        digest.update(kinds)
+    return [curve.data_path, curve.mute, curve.extrapolation, digest.hexdigest(),
             [_properties(modifier) for modifier in curve.modifiers]]
 
 

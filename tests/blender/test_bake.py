@@ -146,6 +146,7 @@ def test_a_change_makes_it_stale(face, change, words):
     assert bake.bake_state(skin, armature, scene) == bake.BakeState(True, "")
     scene.frame_set(77)  # scrubbing changes the sliders, and nothing that the bake depends on
     controls.set_controls(armature, {"AU12": 1.0})
+    set_keys(action_curve(armature, path_of("AU12")), [1, 9], [0.0, 1.0])
     assert bake.bake_state(skin, armature, scene) == bake.BakeState(True, "")
     change(armature, scene)
     assert words in bake.bake_state(skin, armature, scene).stale
