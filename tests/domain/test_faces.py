@@ -232,22 +232,22 @@ def test_no_emotion_pushes_the_lips_or_lids_through_each_other(head_id):
     for name, level in itertools.product(EMOTION_CONTROLS, (0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5)):
         shut = eye_aperture(head_id, {"AU43": 1.0})
         assert eye_aperture(head_id, {name: level}) > shut - VISIBLE_MM, (name, level)
-        # The tightest of the units that press lips together (28 at full) crosses them by more than this.
-        assert lip_parting(head_id, {name: level}) > -7.0, (name, level)
+        # Pressed lips hide their red, which is 6 mm high on the upper lip and more on the lower: 5 mm is tight, more than
+        # 5.5 would be skin on skin.
+        assert lip_parting(head_id, {name: level}) > -5.5, (name, level)
 
 
 @pytest.mark.parametrize("head_id", HEADS)
 @pytest.mark.parametrize(
     "controls",
-    [{}, *({name: v} for name in EMOTION_CONTROLS for v in (0.25, 1.0, 1.5)), {"AU6": 1.0, "AU7": 1.0}, {"AU63": 1.0},
+    [{}, *({name: v} for name in EMOTION_CONTROLS for v in (1.0, 1.5)), {"AU6": 1.0, "AU7": 1.0}, {"AU63": 1.0},
      {"AU6": 1.0, "AU43": 0.5}, {"AU7": 1.0, "AU9": 1.0, "AU10": 1.0}],
     ids=str,
 )  # fmt: skip
 def test_the_eye_is_seen_between_the_lids_and_nowhere_else(head_id, controls):
     """An eyeball that pushes through a lid is a second opening."""
-    for side in "LR":
-        openings = eye_openings(head_id, controls, side)
-        # Half a square millimetre is a pixel or two of a close-up: the caruncle's fold leaves such specks at rest.
+    for openings in eye_openings(head_id, controls):
+        # Half a square millimetre is a pixel or two of a close-up: what sampling makes of the lids' edges.
         assert all(area < 0.5 for area in openings[1:]), openings
 
 

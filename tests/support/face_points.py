@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from scipy import ndimage
 
 from sanguine.app.faces import example_head
 from sanguine.domain.facs import shape_key_values
@@ -102,7 +103,7 @@ def rest_mm(head_id: str, point: str) -> np.ndarray:
     return head(head_id).part("skin").vertices[skin_points()[point]] * 1e3
 
 
-PIXEL_MM = 0.25
+PIXEL_MM = 0.35
 
 
 def posed(part, controls: dict[str, float]) -> np.ndarray:
@@ -141,21 +142,34 @@ def _front(vertices: np.ndarray, faces: np.ndarray, window: tuple[float, float, 
     i = np.floor((points[:, 0] - x0) / PIXEL_MM).astype(int)
     j = np.floor((points[:, 2] - z0) / PIXEL_MM).astype(int)
     keep = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
-    depth = np.full((rows, columns), np.inf)
-    np.minimum.at(depth, (j[keep], i[keep]), points[keep, 1])
-    return depth
+    depth = np.full(rows * columns, np.inf)
+    back_to_front = np.argsort(-points[keep, 1])
+    depth[(j[keep] * columns + i[keep])[back_to_front]] = points[keep, 1][back_to_front]
+    return depth.reshape(rows, columns)
 
 
-def eye_openings(head_id: str, controls: dict[str, float], side: str) -> list[float]:
-    """Areas (mm^2) of the separate patches in which an eye is seen from the front, largest first."""
-    from scipy import ndimage
-
-    sign = 1 if side == "L" else -1
+@cache
+def _windows(head_id: str) -> list[tuple[tuple[float, float, float, float], np.ndarray, np.ndarray]]:
+    """Of both eyes: the window, the eye's faces, and the fine skin's faces that can come near it."""
     eyes = head(head_id).part("eyes")
-    own = (sign * eyes.vertices[eyes.faces, 0] > 0).all(axis=1)
-    ball = posed(eyes, controls)
-    middle = eyes.vertices[np.unique(eyes.faces[own])].mean(axis=0) * 1e3
-    window = (middle[0] - 20, middle[0] + 20, middle[2] - 15, middle[2] + 15)
-    seen = _front(ball, eyes.faces[own], window, 14) < _front(*fine_skin(head_id, controls), window, 14)
-    patches, count = ndimage.label(seen)
-    return sorted((np.bincount(patches.ravel())[1:] * PIXEL_MM**2).tolist(), reverse=True) if count else []
+    vertices, faces = fine_skin(head_id, {})
+    found = []
+    for sign in (1, -1):
+        own = eyes.faces[(sign * eyes.vertices[eyes.faces, 0] > 0).all(axis=1)]
+        x, _, z = eyes.vertices[np.unique(own)].mean(axis=0) * 1e3
+        at = vertices[faces].mean(axis=1)
+        near = (np.abs(at[:, 0] - x) < 40) & (np.abs(at[:, 2] - z) < 35) & (at[:, 1] < -90)
+        found.append(((x - 20, x + 20, z - 15, z + 15), own, faces[near]))
+    return found
+
+
+def eye_openings(head_id: str, controls: dict[str, float]) -> list[list[float]]:
+    """Of both eyes: areas (mm^2) of the separate patches in which it is seen from the front, largest first."""
+    ball = posed(head(head_id).part("eyes"), controls)
+    skin, _ = fine_skin(head_id, controls)
+    areas = []
+    for window, eye, lids in _windows(head_id):
+        seen = _front(ball, eye, window, 10) < _front(skin, lids, window, 9)
+        patches, count = ndimage.label(seen)
+        areas.append(sorted((np.bincount(patches.ravel())[1:] * PIXEL_MM**2).tolist(), reverse=True) if count else [])
+    return areas
