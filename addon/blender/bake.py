@@ -32,10 +32,12 @@ _TABLES = hashlib.sha256(repr((BLOOD, VASCULAR)).encode()).hexdigest()
 
 @dataclass(frozen=True)
 class BakeState:
-    """baked: whether the face plays baked blood. stale: why it is not what the animation asks for now, "" if it is."""
+    """baked: whether the face plays baked blood. stale: why it is not what the animation asks for now, "" if it is.
+    driven: whether drivers move a slider, whose own animation the fingerprint does not see."""
 
     baked: bool
     stale: str = ""
+    driven: bool = False
 
 
 def bake_blood(
@@ -104,7 +106,7 @@ def bake_state(face: bpy.types.Object, armature: bpy.types.Object, scene: bpy.ty
         return BakeState(True, f"it covers frames {record['first']} to {record['last']}, not {first} to {last}")
     if record["of"] != fingerprint(armature, scene):
         return BakeState(True, "the animation, the frame rate or the model has changed since")
-    return BakeState(True)
+    return BakeState(True, driven=bool(_drivers(armature)))
 
 
 def sample(
@@ -148,7 +150,7 @@ def fingerprint(armature: bpy.types.Object, scene: bpy.types.Scene) -> str:
         still,
         [_curve_print(curve) for curve in _slider_curves(armature)],
         [_properties(strip) for strip in strips],
-        [_driver_print(curve) for curve in (animation.drivers if animation else ()) if CONTROL_BONE in curve.data_path],
+        [_driver_print(curve) for curve in _drivers(armature)],
     ]
     return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
 
@@ -173,6 +175,13 @@ def _path(slider: str) -> str:
 def _slider_curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
     paths = {_path(name) for name in _sliders(armature)}
     return [curve for curve in curves(armature) if curve.data_path in paths and len(curve.keyframe_points)]
+
+
+def _drivers(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Somebody else's, that move sliders."""
+    paths = {_path(name) for name in _sliders(armature)}
+    animation = armature.animation_data
+    return [curve for curve in animation.drivers if curve.data_path in paths] if animation else []
 
 
 def _strips(animation: bpy.types.AnimData | None) -> list[bpy.types.NlaStrip]:

@@ -94,6 +94,8 @@ class SANGUINE_PT_time(_FacePanel, bpy.types.Panel):
             layout.label(text=state.stale)
         else:
             layout.label(text="Baked", icon="CHECKMARK")
+            if state.driven:
+                layout.label(text="Drivers move a slider: bake before rendering", icon="INFO")
         layout.operator(SANGUINE_OT_bake_blood.bl_idname, icon="FCURVE")
         layout.operator(SANGUINE_OT_clear_blood.bl_idname, icon="X")
         layout.operator(SANGUINE_OT_add_poses.bl_idname, icon="ASSET_MANAGER")

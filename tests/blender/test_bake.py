@@ -111,6 +111,8 @@ def test_sliders_are_followed_whatever_moves_them(face):
     assert moved["anger"] == pytest.approx(keyed["anger"], abs=1e-6)
     assert moved["happy"] == pytest.approx(np.full(120, 0.5)) and moved["hypoxia"] == pytest.approx(np.full(120, 0.75))
     assert [scene.name for scene in bpy.data.scenes] == [bpy.context.scene.name]
+    bake.bake_blood(skin, armature, bpy.context.scene)
+    assert bake.bake_state(skin, armature, bpy.context.scene) == bake.BakeState(True, "", driven=True)
 
 
 def test_pulse_and_pressure_are_baked(face):
