@@ -136,12 +136,21 @@ def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps
         "growth": asdict(subject.growth),
         "maps": maps,
         "pose": (pose := pose_of(shot, job)).model_dump(exclude={"id", "frame"}),
-        "blood": "as in life" if pose.blood <= 1.0 else f"exaggerated {pose.blood:g} times",
+        "blood": blood_words(pose),
         "light": shot.light.model_dump(),
         "camera": shot.camera.model_dump(),
         "image": shot.image.model_dump(exclude={"samples"}),
         "quality": settings.model_dump(),
     }
+
+
+def blood_words(pose: Pose) -> str:
+    """What was made more of than in life, for whoever looks at the picture."""
+    more = [
+        *([f"exaggerated {pose.blood:g} times"] if pose.blood > 1.0 else []),
+        *([f"hurried {pose.blood_pace:g} times"] if pose.blood_pace > 1.0 else []),
+    ]
+    return ", ".join(more) or "as in life"
 
 
 def sha256(path: Path) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL, blood_property
+from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PACE_CONTROL, PRESSURE_CONTROL, blood_property
 from ..domain.effects import pressure
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
@@ -165,7 +165,7 @@ def _range(armature: bpy.types.Object, scene: bpy.types.Scene) -> tuple[int, int
 def _sliders(armature: bpy.types.Object) -> list[str]:
     """What the blood depends on."""
     bone = armature.pose.bones[CONTROL_BONE]
-    return [n for n in (*blood_sliders(armature), BLOOD_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL) if n in bone]
+    return [n for n in (*blood_sliders(armature), BLOOD_CONTROL, PACE_CONTROL, HEART_RATE_CONTROL, PRESSURE_CONTROL) if n in bone]
 
 
 def _path(slider: str) -> str:

@@ -19,6 +19,8 @@ from ..domain.blood import (
     BLOOD_CONTROL_MAX,
     HEART_RATE_CONTROL,
     MOOD_SUFFIX,
+    PACE,
+    PACE_CONTROL,
     PRESSURE_CONTROL,
     PULSE_CONTROL,
     STATES,
@@ -87,6 +89,9 @@ CONTROLS: dict[str, Control] = {
         1.0,
         BLOOD_CONTROL_MAX,
         BLOOD_CONTROL_MAX,
+    ),
+    PACE_CONTROL: Control(
+        "How fast blood follows when it is baked: 1 as in life, above 1 hurried", 1.0, PACE[1], PACE[1], minimum=PACE[0]
     ),
     **{name: Control(help) for name, help in UNIT_CONTROLS.items()},
 }

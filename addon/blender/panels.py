@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, MOOD_SUFFIX, STATES
+from ..domain.blood import BLOOD_CONTROL, HEART_RATE_CONTROL, MOOD_SUFFIX, PACE_CONTROL, STATES
 from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
@@ -50,7 +50,7 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         bone = emotion_bone(face) if face else None
         if bone is None:
             return
-        for names in (EMOTION_CONTROLS, [*STATES, *OPTIONAL, HEART_RATE_CONTROL], [BLOOD_CONTROL]):
+        for names in (EMOTION_CONTROLS, [*STATES, *OPTIONAL, HEART_RATE_CONTROL], [BLOOD_CONTROL, PACE_CONTROL]):
             column = layout.column(align=True)
             for name in names:
                 if name in bone:
@@ -65,6 +65,8 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
 def _slider_label(bone: bpy.types.PoseBone, name: str) -> str:
     if name == BLOOD_CONTROL and bone[name] > 1.0:
         return "Blood (exaggerated)"
+    if name == PACE_CONTROL and bone[name] > 1.0:
+        return "Blood pace (hurried)"
     return STATES[name].label if name in STATES else name.replace("_", " ").capitalize()
 
 

@@ -29,6 +29,10 @@ BLOOD_CONTROL = "blood"
 BLOOD_CONTROL_MAX = 2.0
 """The artist's slider over all blood change: 0 none, 1 as in life, above 1 exaggerated."""
 
+PACE_CONTROL = "blood_pace"
+PACE = (0.1, 10.0)
+"""The slider over how fast blood follows: 1 as in life, above 1 hurried, for shots shorter than a blush is."""
+
 PULSE_CONTROL = "pulse"
 HEART_RATE_CONTROL = "heart_rate"
 """Sliders of the heartbeat: how strongly it shows (1 as in life) and its rate per minute. Only baked blood has it."""

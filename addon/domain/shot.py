@@ -15,7 +15,7 @@ import numpy as np
 import pydantic
 
 from . import people
-from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, PULSE_CONTROL, STATES, Blood, Change, settled
+from .blood import BLOOD, BLOOD_CONTROL, BLOOD_CONTROL_MAX, HEART_RATE_CONTROL, PACE, PACE_CONTROL, PULSE_CONTROL, STATES, Blood, Change, settled
 from .effects import Frame, Growth, Scene
 from .effects.effect import Interval
 from .errors import InputError, nearest
@@ -124,12 +124,14 @@ class Subject(_Table):
 
 
 class Pose(_Table):
-    """Emotions, action units and states of the body, the strength of the blood's answer (above 1: exaggerated), the heart."""
+    """Emotions, action units and states of the body, the strength of the blood's answer (above 1: exaggerated) and
+    its pace (above 1: hurried), the heart."""
 
     emotions: dict[str, Level] = {}
     action_units: dict[str, Fraction] = {}
     states: dict[str, Fraction] = {}
     blood: Annotated[float, pydantic.Field(ge=0.0, le=BLOOD_CONTROL_MAX, allow_inf_nan=False)] = 1.0
+    blood_pace: Annotated[float, pydantic.Field(ge=PACE[0], le=PACE[1])] = 1.0
     pulse: Fraction = 0.0
     heart_rate: Annotated[float, pydantic.Field(ge=HEART_RATE[0], le=HEART_RATE[1])] = HEART_RATE_AT_REST
 
@@ -167,7 +169,8 @@ class Pose(_Table):
         """Slider -> value, of those that the pose names and those that every face has."""
         return {
             **self.feelings, **self.action_units,
-            BLOOD_CONTROL: self.blood, PULSE_CONTROL: self.pulse, HEART_RATE_CONTROL: self.heart_rate,
+            BLOOD_CONTROL: self.blood, PACE_CONTROL: self.blood_pace,
+            PULSE_CONTROL: self.pulse, HEART_RATE_CONTROL: self.heart_rate,
         }
 
 
@@ -388,6 +391,7 @@ def pose_at(timeline: Timeline, frame: int) -> Pose:
         action_units=blend(before.action_units, after.action_units),
         states=blend(before.states, after.states),
         blood=mix(before.blood, after.blood),
+        blood_pace=mix(before.blood_pace, after.blood_pace),
         pulse=mix(before.pulse, after.pulse),
         heart_rate=mix(before.heart_rate, after.heart_rate),
     )

@@ -29,6 +29,8 @@ from .blood import (
     ELSEWHERE,
     EVIDENCE,
     HEART_RATE_CONTROL,
+    PACE,
+    PACE_CONTROL,
     PULSE_CONTROL,
     Blood,
     BloodChannel,
@@ -162,6 +164,19 @@ class Controls:
     time_s: np.ndarray
     values: Mapping[str, np.ndarray]
 
+    @property
+    def blood_time_s(self) -> np.ndarray:
+        """The blood's own clock, which the artist's pace makes run faster or slower than time."""
+        pace = np.clip(np.broadcast_to(self.values.get(PACE_CONTROL, 1.0), self.time_s.shape), *PACE)
+        if (pace == 1.0).all():
+            return self.time_s
+        return _integral(pace, self.time_s)
+
+
+def _integral(rate: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    """Since the first moment, of a rate that is linear between times."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time_s))])
+
 
 def follow(
     target: np.ndarray,
@@ -260,7 +275,7 @@ def _answers(
     if not parts:
         return {}
     times = np.array([vascular.times(kinetics, key[0]) for key, kinetics, _ in parts])
-    answers = follow(np.stack(list(parts.values()), axis=1), controls.time_s, *times.T)
+    answers = follow(np.stack(list(parts.values()), axis=1), controls.blood_time_s, *times.T)
     sums = {key: np.zeros(len(controls.time_s)) for key in channels}
     for (key, _, sign), answer in zip(parts, answers.T, strict=True):
         sums[key] += sign * answer
@@ -279,7 +294,7 @@ def reach(controls: Collection[str], blood: Blood = BLOOD, vascular: Vascular = 
 
 def pressure_over_time(controls: Controls, pressure: np.ndarray, vascular: Vascular = VASCULAR) -> np.ndarray:
     """How much of the blood under a pressed place is away: at once with the pressure, back by the capillary refill."""
-    return follow(pressure, controls.time_s, *vascular.times("refill", ELSEWHERE))
+    return follow(pressure, controls.blood_time_s, *vascular.times("refill", ELSEWHERE))
 
 
 def _beats(controls: Controls, delay_s: float) -> np.ndarray:
@@ -288,7 +303,7 @@ def _beats(controls: Controls, delay_s: float) -> np.ndarray:
     rate = np.broadcast_to(controls.values.get(HEART_RATE_CONTROL, HEART_RATE_AT_REST), t.shape) / 60.0
     if len(t) == 1:
         return (t - delay_s) * rate
-    at_knots = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
+    at_knots = _integral(rate, t)
     asked = t - delay_s
     k = np.clip(np.searchsorted(t, asked, side="right") - 1, 0, len(t) - 2)
     step = asked - t[k]

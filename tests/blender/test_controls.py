@@ -186,7 +186,7 @@ def test_controls_have_range_tooltip_and_default_and_can_be_overridden(face):
     controls.add_controls(face[0], (), controls.OPTIONAL)
     bone = face[0].pose.bones[controls.CONTROL_BONE]
     assert set(bone.keys()) >= set(controls.CONTROLS)
-    others = {"blood": (0.0, 2.0, 1.0), "heart_rate": (20.0, 250.0, 70.0)}
+    others = {"blood": (0.0, 2.0, 1.0), "blood_pace": (0.1, 10.0, 1.0), "heart_rate": (20.0, 250.0, 70.0)}
     for name, control in controls.CONTROLS.items():
         ui = bone.id_properties_ui(name).as_dict()
         low, high, default = others.get(name, (0.0, EMOTION_MAX if name in (*EMOTION_CONTROLS, *MOODS) else 1.0, 0.0))

@@ -172,6 +172,19 @@ def test_exaggeration_is_a_factor_at_once():
     assert twice[1:] == pytest.approx(2.0 * plain[1:])
 
 
+def test_a_pace_is_a_clock_of_the_bloods_own():
+    """Twice the pace is the answer of twice the time; a pace that changes leaves the past as it was."""
+    time_s = np.arange(0.0, 40.0, 1 / 24)
+    anger = np.interp(time_s, [1.0, 2.0, 9.0, 10.0], [0.0, 1.0, 1.0, 0.0])
+    hurried = blood_over_time(Controls(time_s, {"anger": anger, "blood_pace": np.full_like(time_s, 2.0)}))[CHEEKS]
+    slow_motion = blood_over_time(Controls(2.0 * time_s, {"anger": anger}))[CHEEKS]
+    assert hurried == pytest.approx(slow_motion, abs=1e-12)
+    plain = blood_over_time(Controls(time_s, {"anger": anger}))[CHEEKS]
+    late = blood_over_time(Controls(time_s, {"anger": anger, "blood_pace": np.where(time_s < 20.0, 1.0, 4.0)}))[CHEEKS]
+    half = time_s.searchsorted(19.9)
+    assert late[:half] == pytest.approx(plain[:half], abs=1e-12) and late[-1] < 0.5 * plain[-1]
+
+
 def test_the_heart_beats_at_its_rate_and_late_where_it_is_far():
     time_s = np.arange(0.0, 60.0, 1 / 48)
     rate = np.full_like(time_s, 90.0)
