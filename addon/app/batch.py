@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -13,14 +12,14 @@ from typing import Any, Protocol
 import sanguine_core
 
 from ..domain.errors import InputError
-from ..domain.files import atomic, read_json, write_json
+from ..domain.files import atomic
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice, Settings
 from ..domain.shot import Job, Pose, Shot, Subject, jobs, pose_of, scene_of
+from .manifest import Manifest, finished, sha256
 from .map_cache import key_of
 from .skin_maps import Tiles, read_face_maps
 
-MANIFEST = "manifest.json"
 CONTACT_SHEET = "contact_sheet.png"
 # Beyond this a contact sheet shows nothing any more.
 _CONTACT_SHEET_IMAGES = 100
@@ -73,38 +72,35 @@ def render_batch(
     kept = whole if resume else {}
     # With `only`, what an earlier run made of the other images stays in the manifest.
     files = {name: row for name, row in whole.items() if resume or Path(name).stem not in {job.id for job in wanted}}
-    # Written before the work as well as after each image: an unwritable folder is found at once.
-    write_manifest(folder, shot_path, files)
     done = 0
-    for subject in shot.subjects:
-        mine = [job for job in wanted if job.subject == subject.id]
-        face = read_face_maps(subject.maps)
-        plan = make_plan(scene_of(shot, subject, renderer.regions(subject), face.ranges), settings)
-        missing = []
-        poses = [pose_of(shot, job).model_dump(exclude={"id", "frame"}) for job in jobs(shot) if job.subject == subject.id]
-        measured = shot.profile.model_dump_json() if shot.profile else ""
-        whole_shot = key_of(renderer.version, measured, shot.timeline.fps if shot.timeline else 0.0, poses)
-        for job in mine:
-            prints = key_of(whole_shot, _parameters(shot, subject, job, settings, face.digest))
-            if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in IMAGE_SUFFIXES):
+    with Manifest(folder, shot_path, files) as manifest:
+        for subject in shot.subjects:
+            mine = [job for job in wanted if job.subject == subject.id]
+            face = read_face_maps(subject.maps)
+            plan = make_plan(scene_of(shot, subject, renderer.regions(subject), face.ranges), settings)
+            missing = []
+            poses = [pose_of(shot, job).model_dump(exclude={"id", "frame"}) for job in jobs(shot) if job.subject == subject.id]
+            measured = shot.profile.model_dump_json() if shot.profile else ""
+            whole_shot = key_of(renderer.version, measured, shot.timeline.fps if shot.timeline else 0.0, poses)
+            for job in mine:
+                prints = key_of(whole_shot, _parameters(shot, subject, job, settings, face.digest))
+                if all(kept.get(job.id + suffix, {}).get("fingerprint") == prints for suffix in IMAGE_SUFFIXES):
+                    done += 1
+                else:
+                    missing.append((job, prints))
+            if missing or keep_blend:
+                progress(f"preparing {subject.id}", done, len(wanted))
+                renderer.prepare(shot, subject, plan, face.images)
+            if keep_blend:
+                with atomic(folder / f"{subject.id}.blend") as blend:
+                    renderer.save(blend)
+            for job, prints in missing:
+                progress(f"rendering {job.id}", done, len(wanted))
+                manifest.add(_render(shot, subject, plan, job, face.digest, prints, folder, renderer))
                 done += 1
-            else:
-                missing.append((job, prints))
-        if missing or keep_blend:
-            progress(f"preparing {subject.id}", done, len(wanted))
-            renderer.prepare(shot, subject, plan, face.images)
-        if keep_blend:
-            with atomic(folder / f"{subject.id}.blend") as blend:
-                renderer.save(blend)
-        for job, prints in missing:
-            progress(f"rendering {job.id}", done, len(wanted))
-            files |= _render(shot, subject, plan, job, face.digest, prints, folder, renderer)
-            write_manifest(folder, shot_path, files)
-            done += 1
-    _contact_sheet(shot, folder, files)
-    write_manifest(folder, shot_path, files)
+        manifest.add(_contact_sheet(shot, folder, manifest.files))
     progress("rendered", done, len(wanted))
-    return read_json(folder / MANIFEST)
+    return manifest.content
 
 
 def _render(
@@ -153,40 +149,11 @@ def blood_words(pose: Pose) -> str:
     return ", ".join(more) or "as in life"
 
 
-def sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def finished(folder: Path) -> dict[str, dict[str, Any]]:
-    """Files of an earlier manifest that are there and whole."""
-    if not (folder / MANIFEST).exists():
-        return {}
-    data = read_json(folder / MANIFEST)
-    rows = data.get("files") if isinstance(data, dict) else None
-    if not isinstance(rows, list) or not all(isinstance(row, dict) and "file" in row for row in rows):
-        raise InputError(f"{folder / MANIFEST}: files: not a manifest of sanguine; remove it or leave --resume out")
-    whole = {}
-    for row in rows:
-        path = folder / Path(str(row["file"])).name
-        if path.is_file() and sha256(path) == row.get("sha256"):
-            whole[row["file"]] = row
-    return whole
-
-
-def write_manifest(folder: Path, shot_path: str | os.PathLike[str], files: dict[str, dict[str, Any]]) -> None:
-    write_json(
-        folder / MANIFEST,
-        {"sanguine": sanguine_core.__version__, "shot": Path(shot_path).name,
-         "files": [files[name] for name in sorted(files)]},
-    )
-
-
-def _contact_sheet(shot: Shot, folder: Path, files: dict[str, dict[str, Any]]) -> None:
+def _contact_sheet(shot: Shot, folder: Path, files: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """All images of the shot side by side, once they are all there."""
     every = [job.id for job in jobs(shot)]
     if len(every) > _CONTACT_SHEET_IMAGES or any(f"{name}.png" not in files for name in every):
-        return
+        return {}
     with atomic(folder / CONTACT_SHEET) as path:
         sanguine_core.contact_sheet([str(folder / f"{name}.png") for name in every], every, str(path))
-    files[CONTACT_SHEET] = {"file": CONTACT_SHEET, "sha256": sha256(folder / CONTACT_SHEET), "of": every}
+    return {CONTACT_SHEET: {"file": CONTACT_SHEET, "sha256": sha256(folder / CONTACT_SHEET), "of": every}}

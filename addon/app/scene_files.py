@@ -12,7 +12,8 @@ import sanguine_core
 
 from ..domain.errors import InputError, nearest
 from ..domain.files import atomic
-from .batch import IMAGE_SUFFIXES, finished, sha256, write_manifest
+from .batch import IMAGE_SUFFIXES
+from .manifest import Manifest, finished, sha256
 from .map_cache import key_of
 
 
@@ -75,23 +76,22 @@ def render_file(
     whole = finished(folder) if resume or only is not None else {}
     kept = {name for name, row in whole.items() if resume and row.get("fingerprint") == fingerprint}
     files = {name: row for name, row in whole.items() if name in kept or Path(name).stem not in wanted}
-    write_manifest(folder, path, files)
-    for done, name in enumerate(wanted):
-        if all(name + suffix in kept for suffix in IMAGE_SUFFIXES):
-            continue
-        progress(f"rendering {name}", done, len(wanted))
-        start = time.perf_counter()
-        with atomic(folder / f"{name}.png") as png, atomic(folder / f"{name}.exr") as exr:
-            scene.render(names[name], png, exr)
-            sums = {".png": sha256(png), ".exr": sha256(exr)}
-        row = {
-            "frame": names[name],
-            "baked": {face: list(frames) for face, frames in baked.items()},
-            "seconds": round(time.perf_counter() - start, 3),
-            "fingerprint": fingerprint,
-        }
-        files |= {name + suffix: {"file": name + suffix, "sha256": sums[suffix], **row} for suffix in IMAGE_SUFFIXES}
-        write_manifest(folder, path, files)
+    with Manifest(folder, path, files) as manifest:
+        for done, name in enumerate(wanted):
+            if all(name + suffix in kept for suffix in IMAGE_SUFFIXES):
+                continue
+            progress(f"rendering {name}", done, len(wanted))
+            start = time.perf_counter()
+            with atomic(folder / f"{name}.png") as png, atomic(folder / f"{name}.exr") as exr:
+                scene.render(names[name], png, exr)
+                sums = {".png": sha256(png), ".exr": sha256(exr)}
+            row = {
+                "frame": names[name],
+                "baked": {face: list(frames) for face, frames in baked.items()},
+                "seconds": round(time.perf_counter() - start, 3),
+                "fingerprint": fingerprint,
+            }
+            manifest.add({name + end: {"file": name + end, "sha256": sums[end], **row} for end in IMAGE_SUFFIXES})
     progress("rendered", len(wanted), len(wanted))
 
 

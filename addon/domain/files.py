@@ -50,14 +50,14 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
-def read_json(path: str | os.PathLike[str]) -> Any:
+def read_json(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES) -> Any:
     """Parsed JSON. Raises InputError with the line of a syntax fault; NaN and Infinity are not JSON."""
 
     def no_constant(name: str) -> Any:
         raise InputError(f"{path}: {name} is not a number that JSON allows")
 
     try:
-        return json.loads(read_text(path), parse_constant=no_constant)
+        return json.loads(read_text(path, max_bytes), parse_constant=no_constant)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}: not valid JSON: line {error.lineno}, column {error.colno}: {error.msg}") from None
     except InputError:

@@ -153,3 +153,25 @@ def test_quality_reaches_the_plan_and_the_manifest_and_another_one_renders_anew(
     assert not again.rendered
     render_batch(shot, EXAMPLE, tmp_path, other, resume=True, quality=choice("reference", None))
     assert len(other.rendered) == 5
+
+
+def test_thousands_of_images_survive_a_kill(tmp_path):
+    """Rows go to a journal, not into the whole manifest each time, and a torn last line loses one image."""
+    from sanguine.app.manifest import Manifest, finished
+
+    names = [f"{i:06d}.png" for i in range(1000)]
+    for name in names:
+        (tmp_path / name).write_bytes(name.encode())
+    rows = {name: {"file": name, "sha256": hashlib.sha256(name.encode()).hexdigest()} for name in names}
+    run = Manifest(tmp_path, "shot.toml", {})
+    run.__enter__()  # and never left: killed
+    for name in names:
+        run.add({name: rows[name]})
+    assert len(manifest(tmp_path)["files"]) < 1000
+    assert finished(tmp_path) == rows
+    journal = tmp_path / "manifest.journal"
+    journal.write_text(journal.read_text()[:-10])
+    assert finished(tmp_path) == {name: rows[name] for name in names[:-1]}
+    with Manifest(tmp_path, "shot.toml", finished(tmp_path)):
+        pass
+    assert not journal.exists() and len(manifest(tmp_path)["files"]) == 999
