@@ -58,6 +58,7 @@ bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour
 	$(PY) bench/inversion.py
 	$(PY) bench/measured_people.py
 	$(PY) bench/strain.py
+	$(PY) bench/blood_colour.py --extremes
 	$(PY) bench/feature_pictures.py --only times
 	$(PY) bench/picture.py
 

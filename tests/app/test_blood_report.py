@@ -1,8 +1,11 @@
 """What blood does to colour: the same physiology on every tone, sizes that life has, cyanosis by deoxygenated hemoglobin."""
 
+import importlib.util
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -177,3 +180,19 @@ def test_the_verb(tmp_path):
 def test_bad_input_is_one_line(arguments, words):
     result = run(*arguments)
     assert result.returncode == 2 and result.stdout == "" and words in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_the_page_has_the_numbers_of_today():
+    """docs/blood.md is written by bench/blood_colour.py; whoever changes blood writes it anew."""
+    root = Path(__file__).resolve().parents[2]
+    spec = importlib.util.spec_from_file_location("blood_colour", root / "bench" / "blood_colour.py")
+    bench = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(bench)
+    page = bench.PAGE.read_text(encoding="utf-8")
+    again = bench.written(page)
+    number = re.compile(r"[+-]?\d+(?:\.\d+)?")
+    assert number.sub("#", page) == number.sub("#", again), "run bench/blood_colour.py"
+    for old, new in zip(number.findall(page), number.findall(again), strict=True):
+        # One unit of the last printed digit: another machine may round the other way.
+        unit = 10.0 ** -len(old.partition(".")[2])
+        assert float(new) == pytest.approx(float(old), abs=1.01 * unit), f"{old} is {new}: run bench/blood_colour.py"
