@@ -30,7 +30,7 @@ from sanguine.domain.facs import (
     shape_key_values,
     unit_values,
 )
-from sanguine.domain.own_keys import OWN_KEY_NAMES
+from sanguine.domain.own_keys import OWN_KEY_NAMES, read_own_keys
 from sanguine.domain.resources import rigs_path
 from sanguine.domain.response import MAX_EXPRESSION, driver_text
 
@@ -301,3 +301,21 @@ def test_the_page_of_the_face_is_current():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert (root / "docs/facs.md").read_text(encoding="utf-8") == module.page(), "run `make docs`"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"sanguine_nostrilDilate"', '"sanguine_nostrilCompress"', "sanguine_nostrilCompress: given twice, remove one"),
+        ('"sanguine_nostrilDilate"', '"nostrilDilate"', "key.6.name"),
+        ("bump = { center = [58, -95, 652], radius_mm = 15, move_mm = [3.0, -1.0, 0.0] }", "", "has neither targets nor a bump"),
+    ],
+)  # fmt: skip
+def test_a_broken_table_of_own_keys_says_what_to_mend(tmp_path, old, new, message):
+    broken = tmp_path / "own_keys.toml"
+    text = rigs_path("own_keys.toml").read_text()
+    assert old in text
+    broken.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_own_keys(broken)
+    assert str(caught.value).startswith(f"{broken}: ") and message in str(caught.value)

@@ -14,6 +14,7 @@ from sanguine.domain.facs import shape_key_values
 from sanguine.domain.head.eyes import GAZE_M, fit_sphere
 from sanguine.domain.head.lips import BASE_LINE_M, near_lips, parting
 from sanguine.domain.head.surface import Subdivision, edges_of, locate
+from sanguine.domain.own_keys import OWN_KEYS
 from sanguine.domain.resources import rigs_path
 
 
@@ -65,6 +66,15 @@ def test_every_arkit_key_moves_something_and_no_key_is_empty(head):
     for part in head.parts:
         for name, key in part.shape_keys.items():
             assert key.indices.size and np.isfinite(key.delta).all(), (part.name, name)
+
+
+def test_our_own_keys_are_mirror_images_and_of_the_size_of_a_face(package):
+    units = package.face_units()
+    mirror, flip = package.mirror(), np.float32([-1, 1, 1])
+    for key in OWN_KEYS:
+        left, right = (units[KEY_NAMES.index(name)] for name in key.names)
+        assert np.abs(left[mirror] * flip - right).max() < 1e-6  # rounding of float32
+        assert 1.0 < np.linalg.norm(left, axis=1).max() * 1e3 < 10.0, "mm: seen, and no more than skin slides"
 
 
 def test_keys_move_the_parts_that_anatomy_moves(head):
