@@ -16,7 +16,7 @@ class Mend:
 
     gain     : (mm from the midline, factor) pairs, applied to the whole displacement
     together : a point may go toward the midline by this share of its distance from it, no farther
-    bump     : added to it, given for the left side
+    bump     : added to it, given for the left side; a unit without sides gets it on both
     """
 
     unit: str
@@ -38,7 +38,9 @@ MENDS = (
         "browInnerUp",
         ((0, 1.5), (12, 2.0), (20, 1.8), (30, 1.0), (42, 0.4)),
         0.38,
-        "as sculpted the inner end rises 4 mm, lost on a heavy brow; the medial frontalis lifts it by 8 and more.",
+        "as sculpted the inner end rises 4 mm, lost on a heavy brow; the medial frontalis lifts it by 8 and more. Its lower "
+        "edge stayed behind, which drew the hairs apart.",
+        Bump(center=(14.0, -149.0, 738.0), radius_mm=5.0, move_mm=(0.0, 0.0, 3.2)),
     ),
     Mend(
         "noseSneer",
@@ -66,9 +68,9 @@ def mend(units: np.ndarray, base: np.ndarray) -> None:
             if name.removesuffix("Left").removesuffix("Right") == row.unit:
                 move = units[ARKIT_NAMES.index(name)]
                 move *= factor[:, None]
-                if row.bump is not None:
-                    flip = np.float32([-1, 1, 1]) if name.endswith("Right") else np.float32([1, 1, 1])
-                    move += swelling(row.bump, base * flip) * flip
+                for side, flip in (("Left", np.float32([1, 1, 1])), ("Right", np.float32([-1, 1, 1]))):
+                    if row.bump is not None and (name.endswith(side) or name == row.unit):
+                        move += swelling(row.bump, base * flip) * flip
                 inward = -np.sign(base[:, 0]) * move[:, 0]
                 limit = row.together * np.abs(base[:, 0])
                 # Half the limit is free; beyond it the way inward approaches the limit and never reaches it.
