@@ -138,7 +138,7 @@ class Grown:
             return None
 
         def part(texels: int, of: int) -> bool:
-            return self.progress(1000 * done + 1000 * texels // of, 1000 * total)
+            return self.progress(1000 * done + 1000 * texels // max(of, 1), 1000 * total)
 
         if not part(0, 1):
             raise sanguine_core.Cancelled("cancelled")

@@ -14,6 +14,7 @@ from ..domain.vascular import reach
 from .blood import blood_model, blood_sliders
 from .controls import CONTROL_BONE, add_controls, drive_shape_keys
 from .material import MARK
+from .osl import missing_osl
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
 from .skin import apply_skin, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
@@ -79,6 +80,9 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave to object mode first")
+            return False
+        if why := missing_osl():
+            cls.poll_message_set(why[0].upper() + why[1:])
             return False
         return may_change(cls, active_face(context))
 

@@ -10,6 +10,17 @@ from pathlib import Path
 import bpy
 
 
+def missing_osl() -> str:
+    """Why this Blender cannot show the skin's material, one line, "" when it can. Debian's Cycles is built without OSL."""
+    try:
+        import _cycles
+    except ImportError:
+        return "this Blender has no Cycles, which renders the skin"
+    if not _cycles.with_osl:
+        return "the Cycles of this Blender was built without OSL, which the skin is made of: use a Blender of blender.org"
+    return ""
+
+
 def find_oslquery() -> None:
     """Puts Blender's own packages on the path where they are not: in `bpy` as a module they are left off.
 

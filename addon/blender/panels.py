@@ -22,6 +22,7 @@ from .bake import bake_state
 from .blood import PROFILE
 from .capture import SANGUINE_OT_import_capture
 from .controls import CONTROL_BONE, OPTIONAL
+from .material import MARK
 from .operators import (
     SANGUINE_OT_apply_skin,
     SANGUINE_OT_draw_person,
@@ -30,6 +31,7 @@ from .operators import (
     emotion_bone,
     live_plan,
 )
+from .osl import missing_osl
 from .properties import strength_property
 
 
@@ -47,6 +49,11 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         layout = self.layout
         layout.operator(SANGUINE_OT_apply_skin.bl_idname, icon="MATERIAL")
         face = active_face(context)
+        if missing_osl():
+            layout.label(text="This Blender has no OSL: no skin", icon="ERROR")
+        elif face and context.scene.render.engine != "CYCLES" and any(m and MARK in m for m in face.data.materials):
+            layout.label(text="Only Cycles shows the skin:", icon="INFO")
+            layout.prop(context.scene.render, "engine", text="")
         bone = emotion_bone(face) if face else None
         if bone is None:
             return
@@ -90,7 +97,7 @@ class SANGUINE_PT_time(_FacePanel, bpy.types.Panel):
         layout, rig = self.layout, rig_of(context)
         state = bake_state(active_face(context), rig, context.scene)
         if not state.baked:
-            layout.label(text="Settled: the answer that blood comes to", icon="INFO")
+            layout.label(text="Settled: not in time yet", icon="INFO")
         elif state.stale:
             layout.label(text="Stale: bake again", icon="ERROR")
             layout.label(text=state.stale)
@@ -122,11 +129,16 @@ class SANGUINE_PT_units(_FacePanel, bpy.types.Panel):
         bone = rig_of(context).pose.bones[CONTROL_BONE]
         column = self.layout.column(align=True)
         for unit in ACTION_UNITS.values():
-            row = column.row(align=True)
-            for control in (unit.control, f"{unit.control}R", f"{unit.control}L"):
-                if control in bone:
-                    text = f"{unit.id} {unit.name}" if control == unit.control else control[-1]
-                    row.prop(bone, f'["{control}"]', text=text, slider=True)
+            row = column.split(factor=0.7, align=True)
+            whole, name = f"AU{unit.id}", f"{unit.id} {unit.name}"
+            if whole in bone:
+                row.prop(bone, f'["{whole}"]', text=name, slider=True)
+            else:  # a wink is of one side
+                row.label(text=name)
+            sides = row.row(align=True)
+            for side in "RL":  # as one sees them, face to face
+                if whole + side in bone:
+                    sides.prop(bone, f'["{whole}{side}"]', text=side, slider=True)
 
 
 class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
@@ -138,6 +150,8 @@ class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
         settings = active_face(context).sanguine
         layout.prop(settings, "quality")
         layout.label(text=preset(settings.quality).measured)
+        layout = layout.column(align=True)
+        layout.use_property_split = False  # names and numbers side by side would both be cut
         for row in PARAMETERS.values():
             layout.prop(settings, row.id)
         for effect in EFFECTS:

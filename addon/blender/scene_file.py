@@ -11,6 +11,7 @@ from ..domain.errors import InputError, nearest
 from .bake import RECORD, bake_blood, bake_state
 from .blood import blood_properties
 from .operators import controls_of, emotion_bone
+from .osl import missing_osl
 from .render import quiet, save_render
 
 
@@ -63,6 +64,8 @@ class SceneFile:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, relative_remap=True, check_existing=False)
 
     def render(self, frame: int, png: Path, exr: Path) -> None:
+        if self.scene.render.engine == "CYCLES" and (why := missing_osl()) and self._faces():
+            raise InputError(f"{self.path}: {why}")
         with quiet():
             self.scene.frame_set(frame)
             bpy.ops.render.render(scene=self.scene.name)

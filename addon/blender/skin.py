@@ -15,6 +15,7 @@ from ..domain.udim import FIRST_TILE, check_tiles
 from .bake import clear_bake
 from .blood import drive_settled, remove_blood
 from .material import MARK, Map, build_skin_material, remove_skin_material
+from .osl import missing_osl
 from .properties import images_of
 from .strain import drive_components, remove_components
 from .surface import pixel_mm, read_surface, store_rest
@@ -32,6 +33,8 @@ def apply_skin(
 
     given: the maps that came with the face, by id; left out, those that its properties point to.
     """
+    if why := missing_osl():
+        raise InputError(f"{face.name}: {why}")
     surface = read_surface(face) if plan.maps else None
     maps = _maps(face, surface, plan, images_of(face) if given is None else given, progress) if surface else {}
     plan = reached(plan, maps)

@@ -3,8 +3,9 @@
 import bpy
 import pytest
 import sanguine
-from sanguine.blender import operators, panels
+from sanguine.blender import operators, panels, skin
 from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.errors import InputError
 from sanguine.domain.quality import DEFAULT, PRESETS
 
 
@@ -44,7 +45,7 @@ class Layout:
     def column(self, **_):
         return self
 
-    row = column
+    row = split = column
 
 
 def draw(panel):
@@ -82,6 +83,37 @@ def test_apply_gives_material_sliders_and_panel(addon, engine):
     # The controls are found from the face and from the rig.
     bpy.context.view_layer.objects.active = face.parent
     assert operators.active_face(bpy.context) == face
+
+
+def test_every_unit_of_the_rig_has_its_sliders(addon):
+    face = grid()
+    bpy.ops.sanguine.apply_skin()
+    drawn = draw(panels.SANGUINE_PT_units)
+    assert {name for name in operators.emotion_bone(face).keys() if name.startswith("AU")} == {
+        path[2:-2] for path in drawn if path.startswith('["AU')
+    }
+
+
+def test_a_blender_without_osl_refuses_before_it_changes_anything(addon, monkeypatch):
+    import _cycles
+
+    monkeypatch.setattr(_cycles, "with_osl", False)
+    face = grid()
+    before = {name: len(getattr(bpy.data, name)) for name in ("objects", "materials", "node_groups", "texts", "images")}
+    with pytest.raises(RuntimeError, match="built without OSL"):
+        bpy.ops.sanguine.apply_skin()
+    with pytest.raises(InputError, match="built without OSL"):
+        skin.apply_skin(face, None, operators.live_plan(face))
+    assert before == {name: len(getattr(bpy.data, name)) for name in before}
+
+
+def test_the_panel_says_when_the_engine_does_not_show_the_skin(addon):
+    grid()
+    bpy.ops.sanguine.apply_skin()
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    assert "engine" in draw(panels.SANGUINE_PT_main)
+    bpy.context.scene.render.engine = "CYCLES"
+    assert "engine" not in draw(panels.SANGUINE_PT_main)
 
 
 def test_quality_is_shown_with_its_numbers_and_acts(addon):

@@ -100,6 +100,9 @@ def test_exaggeration_is_called_so(face):
             def operator(self, *_, **__):
                 pass
 
+            def label(self, text, **_):
+                found.append(text)
+
             def column(self, **_):
                 return self
 
