@@ -14,7 +14,7 @@ import time
 
 import bpy
 
-from sanguine.blender.controls import CONTROL_BONE, CONTROLS, add_controls, emotions_of, remove_emotion, set_controls
+from sanguine.blender.controls import AT_REST, CONTROL_BONE, add_controls, emotions_of, remove_emotion, set_controls
 from sanguine.blender.face import add_face
 from sanguine.domain.facs import DEFAULT_EMOTIONS, EMOTION_CONTROLS, UNIT_CONTROLS
 
@@ -27,7 +27,7 @@ def key_sliders(rig: bpy.types.Object, values: dict[str, float]) -> None:
     bone = rig.pose.bones[CONTROL_BONE]
     if rig.animation_data and rig.animation_data.action:
         bpy.data.actions.remove(rig.animation_data.action)
-    set_controls(rig, dict.fromkeys(CONTROLS, 0.0) | {"blood": 1.0})
+    set_controls(rig, AT_REST)
     for name, value in values.items():
         for frame, share in ((1, 0.5), (FRAMES // 2, 1.0), (FRAMES, 0.5)):
             bone[name] = value * share

@@ -97,6 +97,9 @@ CONTROLS: dict[str, Control] = {
 }
 """Every slider that a rig can have, in the order in which they are added."""
 
+AT_REST: dict[str, float] = {name: control.default for name, control in CONTROLS.items()}
+"""A still face with its blood as in life."""
+
 ON_DEMAND: tuple[str, ...] = (*EMOTION_CONTROLS, *STATES, *OPTIONAL, *(name + MOOD_SUFFIX for name in EMOTION_CONTROLS))
 """Those that a rig has only if it was asked for them."""
 
@@ -204,7 +207,7 @@ def remove_controls(armature: bpy.types.Object) -> None:
 def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> None:
     """Sets sliders by name. Raises InputError for an unknown name or a value outside the slider.
 
-    A slider that the rig has not is at 0: that may be asked for, anything else may not.
+    A slider that the rig has not is at rest: that may be asked for, anything else may not.
     """
     bone = armature.pose.bones[CONTROL_BONE]
     for name, value in values.items():
@@ -213,7 +216,7 @@ def set_controls(armature: bpy.types.Object, values: Mapping[str, float]) -> Non
         if name not in CONTROLS:
             raise InputError(f"{name}: no such control, {nearest(name, CONTROLS)}")
         if name not in bone:
-            if value == 0.0:
+            if value in (0.0, CONTROLS[name].default):
                 continue
             raise InputError(f"{name}: not on this rig, which has {', '.join(emotions_of(armature) + states_of(armature))}")
         low, high = CONTROLS[name].minimum, CONTROLS[name].maximum

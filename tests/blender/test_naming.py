@@ -51,7 +51,7 @@ def test_every_convention_is_driven_as_the_domain_says(rig, name):
     assert len(drivers) == len(responses)
     assert all(curve.driver.is_valid and curve.driver.is_simple_expression for curve in drivers)
     for wanted in ({"anger": 1.0}, {"fear": 0.7, "AU12": 0.4, "AU46L": 0.5}, {"happy": 1.5, "AU4R": 0.3}, {}):
-        controls.set_controls(rig, {slider: 0.0 for slider in rig.pose.bones["sanguine"].keys() if slider != "blood"} | wanted)
+        controls.set_controls(rig, controls.AT_REST | wanted)
         expected = formulas(DEFAULT_EMOTIONS).values(responses, wanted)
         seen = values(mesh)
         assert {key: seen[key] for key in expected} == pytest.approx(expected, abs=1e-6)

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from sanguine.app.maps import strain_coefficients, wrinkle_coefficients
-from sanguine.blender.controls import CONTROLS, set_controls
+from sanguine.blender.controls import AT_REST, set_controls
 from sanguine.blender.face import add_face
 from sanguine.blender.render import quiet
 from sanguine.blender.skin import apply_skin
@@ -62,7 +62,7 @@ def expected(skin):
     "pose", [{}, {"happy": 1.0}, {"anger": 0.7, "fear": 0.5}, {"AU12": 0.4, "AU4": 1.0, "AU26": 0.8}], ids=str
 )
 def test_one_evaluation_gives_the_numbers_of_the_domain(face, pose):
-    set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0) | pose)
+    set_controls(face.rig, AT_REST | pose)
     for found, wanted in zip(driven(face.skin), expected(face.skin), strict=True):
         # Keys leave out less than LEAST each, and coefficients are written to four decimals.
         assert found == pytest.approx(wanted, abs=20 * LEAST)
@@ -82,7 +82,7 @@ def test_every_driver_is_short_simple_and_listens_to_keys_of_the_mesh(face):
 
 def test_keyed_values_are_followed_without_lag_and_without_the_add_on(face, tmp_path):
     """Two keys lose the drivers of the rig and are keyed themselves, as in any rig."""
-    set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0))
+    set_controls(face.rig, AT_REST)
     path = str(tmp_path / "face.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     script = f"""

@@ -4,7 +4,7 @@ import bpy
 import colour
 import numpy as np
 import pytest
-from sanguine.blender.controls import CONTROLS, remove_shape_key_drivers, set_controls
+from sanguine.blender.controls import AT_REST, remove_shape_key_drivers, set_controls
 from sanguine.blender.face import add_face
 from sanguine.blender.skin import apply_skin
 from sanguine.blender.stage import set_stage
@@ -61,7 +61,7 @@ def cheeks_lab(melanin):
     render_around([card, *cheeks], CHEEK_PX + 1)
     found = {}
     for name in ("neutral", *EMOTIONS):
-        set_controls(face.rig, dict.fromkeys(CONTROLS, 0.0) | {"blood": 1.0} | ({name: 1.0} if name in EMOTIONS else {}))
+        set_controls(face.rig, AT_REST | ({name: 1.0} if name in EMOTIONS else {}))
         image = render_linear()
         white = mean_around(image, card, 2)
         assert np.all(white > 0.5), "the white patch is not where it is looked for"
