@@ -32,16 +32,17 @@ def rms(moving: strain.MovingSurface, values: np.ndarray) -> np.ndarray:
 def poses(moving: strain.MovingSurface) -> dict[str, np.ndarray]:
     names = moving.keys.names
     random = np.random.default_rng(7)
+    units = [unit for unit in ACTION_UNITS.values() if unit.keys]
     mixes = [
-        dict(zip(random.choice(list(ACTION_UNITS), 4, replace=False), random.uniform(0.2, 1.0, 4), strict=True))
+        dict(zip(random.choice(len(units), 4, replace=False), random.uniform(0.2, 1.0, 4), strict=True))
         for _ in range(40)
     ]
     return {
         "emotions": strain.poses(names, [{name: 1.0} for name in EMOTION_CONTROLS]),
         "half emotions": strain.poses(names, [{name: 0.5} for name in EMOTION_CONTROLS]),
-        "action units": strain.poses(names, [{control: 1.0} for unit in ACTION_UNITS.values() if unit.keys for control in unit.whole]),
+        "action units": strain.poses(names, [dict.fromkeys(unit.whole, 1.0) for unit in units]),
         "mixes of four units": strain.poses(
-            names, [{ACTION_UNITS[unit].control: value for unit, value in mix.items()} for mix in mixes]
+            names, [{control: value for i, value in mix.items() for control in units[i].whole} for mix in mixes]
         ),
         "single keys": np.eye(len(names)),
     }

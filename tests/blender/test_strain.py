@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -14,9 +15,11 @@ from sanguine.blender.render import quiet
 from sanguine.blender.skin import apply_skin
 from sanguine.blender.strain import LEAST, remove_components
 from sanguine.blender.surface import has_pressure, has_shape_keys, read_surface
+from sanguine.domain import strain as domain_strain
 from sanguine.domain.effects import Frame, Scene, strain, wrinkles
 from sanguine.domain.effects.pressure import ATTRIBUTE
 from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.facs import EMOTION_CONTROLS
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import check_strengths, make_plan
 from support.patch import camera_above, empty_scene, plane, render_linear, white_world
@@ -53,9 +56,14 @@ def expected(skin):
     held = skin.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.shape_keys.key_blocks
     values = np.array([held[name].value for name in surface.keys.names])
     return [
-        strain_coefficients(surface) @ values,
-        np.maximum(wrinkle_coefficients(surface) @ values, 0.0),
+        kept(strain_coefficients(surface)) @ values,
+        np.maximum(kept(wrinkle_coefficients(surface)) @ values, 0.0),
     ]
+
+
+def kept(coefficients):
+    """What the drivers hold of them."""
+    return np.where(np.abs(coefficients) >= LEAST, coefficients, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -64,9 +72,23 @@ def expected(skin):
 def test_one_evaluation_gives_the_numbers_of_the_domain(face, pose):
     set_controls(face.rig, AT_REST | pose)
     for found, wanted in zip(driven(face.skin), expected(face.skin), strict=True):
-        # Keys leave out less than LEAST each, and coefficients are written to four decimals.
-        assert found == pytest.approx(wanted, abs=20 * LEAST)
-        assert np.abs(found - wanted).mean() < LEAST
+        # Coefficients are written to four decimals; some forty keys are up in the largest of these poses.
+        assert found == pytest.approx(wanted, abs=40 * 0.00005)
+
+
+def test_what_the_drivers_leave_out_is_small_beside_what_the_components_do(face):
+    """The claim at LEAST, for whole emotions: the blood's error against the exact strain grows by a tenth at most."""
+    moving = read_surface(face.skin).moving
+    pose = domain_strain.poses(moving.keys.names, [{name: 1.0} for name in EMOTION_CONTROLS])
+    exact = domain_strain.blood_change(domain_strain.log_area(moving.pose_strain(pose)))
+    whole = moving.welded_area
+    errors = []
+    for components in (whole, replace(whole, coefficients=kept(whole.coefficients))):
+        found = domain_strain.blood_change(components.at(pose, moving.halves))
+        errors.append(np.sqrt(((found - exact) ** 2 * moving.area_mm2).sum(axis=1) / moving.area_mm2.sum()).mean())
+    assert not np.array_equal(whole.coefficients, kept(whole.coefficients))
+    # 1.104 on the female head, 1.1 rounded up for other versions of the maths library.
+    assert errors[1] < 1.15 * errors[0]
 
 
 def test_every_driver_is_short_simple_and_listens_to_keys_of_the_mesh(face):
@@ -111,11 +133,12 @@ def test_keyed_values_are_followed_without_lag_and_without_the_add_on(face, tmp_
     surface = read_surface(face.skin)
     values = np.array([float(name in ("mouthSmileLeft", "jawOpen")) for name in surface.keys.names])
     wanted = []
-    area, folds = strain_coefficients(surface) @ values, np.maximum(wrinkle_coefficients(surface) @ values, 0.0)
+    area = kept(strain_coefficients(surface)) @ values
+    folds = np.maximum(kept(wrinkle_coefficients(surface)) @ values, 0.0)
     for images, drive in ((strain.IMAGES, area), (wrinkles.IMAGES, folds)):
         wanted += [drive[half, 4 * i : 4 * i + 4] for i in range(len(images)) for half in range(2)]
     assert np.abs(np.concatenate(wanted)).max() > 0.3
-    assert rows[1] == pytest.approx(np.concatenate(wanted), abs=2.5 * LEAST)  # two keys, each left out below LEAST
+    assert rows[1] == pytest.approx(np.concatenate(wanted), abs=2 * 0.00005)  # two keys, written to four decimals
     assert not rows[0].any() and not rows[2].any()
 
 
