@@ -205,11 +205,11 @@ def hide_seams(surface: Surface, images: Mapping[int, np.ndarray], cache: MapCac
 def reached(plan: Plan, images: Mapping[str, np.ndarray | Mapping[int, np.ndarray]]) -> Plan:
     """The plan once its features are painted: its table goes as far as their sums do, not as far as they might."""
     found = {}
-    for name in grown.MAPS.keys() & images.keys():
+    for name in [name for name in images if grown.channels_of(name)]:
         tiles = list(images[name].values()) if isinstance(images[name], Mapping) else [images[name]]
         found[name] = {
             channel: (min(float(tile[..., i].min()) for tile in tiles), max(float(tile[..., i].max()) for tile in tiles))
-            for i, channel in enumerate(grown.MAPS[name])
+            for i, channel in enumerate(grown.channels_of(name))
         }
     return make_plan(replace(plan.scene, maps={**plan.scene.maps, **found}), plan.settings) if found else plan
 
@@ -225,6 +225,8 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
     if name in grown.MAPS:
         strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
         return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
+    if (feature := grown.feature_of(name)) is not None:
+        return cache.get(key_of(layers.key, name), lambda: layers.compose({feature: 1.0}, grown.channels_of(name)))
     if name in strain_effect.IMAGES:
         key = key_of(face.motion_digest, name, size, _PADDING)
         return cache.get(key, lambda: _strain(face, size, strain_effect.IMAGES.index(name)))

@@ -69,7 +69,7 @@ def _maps(plan: Plan, shot: Shot, surface: Surface, framing: Framing) -> list[di
     seen = f"a pixel covers {pixel_mm:.2g} mm" if pixel_mm else "the camera is inside the face"
     rows = []
     for name in [name for name in plan.maps if name not in plan.scene.maps]:
-        detail = name in (*grown.MAPS, *wrinkles.IMAGES)
+        detail = grown.channels_of(name) is not None or name in wrinkles.IMAGES
         size = sizes.detail if detail else sizes.smooth
         if name in wrinkles.IMAGES:
             size = min(size, LARGEST_WRINKLES)

@@ -11,6 +11,7 @@ import bpy
 from ..domain.blood import (
     BLOOD,
     BLOOD_DRIVERS,
+    FEATURE,
     MOOD_SUFFIX,
     PRESSURE_CONTROL,
     PULSE_CONTROL,
@@ -82,6 +83,8 @@ def drive_blood(
         name, response = channel.property_name, channel.response
         what = "blood volume fraction" if channel.quantity == "hemoglobin" else "oxygenation"
         help = f"Change of {what} in the region {channel.region}, driven by the emotions"
+        if channel.quantity == FEATURE:
+            help = f"Strength of what has come out on the skin ({channel.region}), driven by a state of the body"
         skin[name] = 0.0
         describe(skin, name, help, *channel.reach, 0.0)
         skin.property_overridable_library_set(f'["{name}"]', True)

@@ -29,7 +29,11 @@ _OF_THE_FACE = (skin_map.MAP, residual.MAP)
 """Maps that come with the face and stay when the material goes."""
 
 # Maps that 16-bit floats hold: a rounding of 1 in 2000 does not show, and the file has half the size or less.
-_HALF = (*grown.MAPS, *strain.IMAGES, *wrinkles.IMAGES, *_OF_THE_FACE)
+_HALF = (*strain.IMAGES, *wrinkles.IMAGES, *_OF_THE_FACE)
+
+def _is_half(key: str) -> bool:
+    return key in _HALF or grown.channels_of(key) is not None
+
 
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
 # Heights come in mm; the Bump node wants the height of "1" in scene units.
@@ -112,7 +116,7 @@ class _Builder:
         self.images = {key: self._image(key, maps[key]) for key in plan.maps}
 
     def _image(self, key: str, shown: Map) -> bpy.types.Image:
-        return shown if isinstance(shown, bpy.types.Image) else data_image(f"{self.name} {key}", shown, key in _HALF)
+        return shown if isinstance(shown, bpy.types.Image) else data_image(f"{self.name} {key}", shown, _is_half(key))
 
     def node(self, kind: str) -> bpy.types.Node:
         return self.tree.nodes.new(kind)

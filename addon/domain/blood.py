@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+import sanguine_core
 from pydantic import Field
 
 from .errors import InputError, nearest
@@ -18,6 +19,10 @@ from .resources import Row, read_rows, read_table, rigs_path
 from .response import Response
 
 Quantity = Literal["hemoglobin", "oxygenation"]
+FEATURE = "feature"
+"""In the place of a quantity: the strength of something that grows on the skin (`sanguine_core.features()`), 0 to 1, whose
+id stands in the place of the region."""
+
 Sources = Annotated[tuple[str, ...], Field(min_length=1)]
 Change = tuple[float, float]
 """The lowest and the highest change of a quantity that some moment or mix brings."""
@@ -109,7 +114,9 @@ class _Anatomy(Row):
 class _Changes(Row):
     name: str
     kinetics: str = ""
-    change: tuple[ChangeRow, ...]
+    change: tuple[ChangeRow, ...] = ()
+    # What comes out on the skin by it, a feature's id: the slider is its strength.
+    feature: str = ""
 
 
 class _Blood(Row):
@@ -142,7 +149,7 @@ class BloodChannel:
     """One quantity of one region, the sliders that move it, and how far its vessels go at most."""
 
     region: str
-    quantity: Quantity
+    quantity: Quantity | Literal["feature"]
     drives: tuple[Drive, ...]
     low: float
     high: float
@@ -195,6 +202,8 @@ class Blood:
 
     def room(self, region: str, quantity: str) -> Change:
         """How far the reference skin may change so that twice of it stays within its limits."""
+        if quantity == FEATURE:
+            return 0.0, 1.0
         at_rest, limits = self.at_rest(region, quantity), getattr(self.reference, f"{quantity}_limits")
         return (limits[0] - at_rest) / BLOOD_CONTROL_MAX, (limits[1] - at_rest) / BLOOD_CONTROL_MAX
 
@@ -260,6 +269,13 @@ def read_blood(
                     raise InputError(f"{where}: given twice, remove one")
                 kinetics = row.kinetics or group.kinetics or usual_kinetics(row.quantity, row.value)
                 channel[group.name] = Drive(group.name, row.value, kinetics)
+            if group.feature:
+                if group.feature not in FEATURES:
+                    raise InputError(f"{path}: {group.name}: feature: {group.feature}: no such feature, {nearest(group.feature, FEATURES)}")
+                channel = drives.setdefault((group.feature, FEATURE), {})
+                channel[group.name] = Drive(group.name, 1.0, group.kinetics or usual_kinetics(FEATURE, 1.0))
+            elif not group.change:
+                raise InputError(f"{path}: {group.name}: change: it changes nothing, give it rows or a feature")
     return replace(blood, drives={key: tuple(channel.values()) for key, channel in drives.items()})
 
 
@@ -285,6 +301,12 @@ def _check_plausible(row: ChangeRow, blood: Blood, where: str) -> None:
             f"{BLOOD_CONTROL_MAX:g}: keep it from {low:.4f} to {high:.4f}"
         )
 
+
+# What the material can fade in and out: colour and height of the skin. Ink is an axis of its own and stays.
+FEATURES: tuple[str, ...] = tuple(
+    row["id"] for row in sanguine_core.features() if all(change["channel"] != "ink_per_mm" for change in row["changes"])
+)
+"""Features that a state may bring out."""
 
 EVIDENCE: dict[str, Evidence] = {row.id: row for row in read_rows(rigs_path("evidence.csv"), Evidence)}
 ANATOMY: dict[str, Rest] = read_anatomy(rigs_path("anatomy.toml"), EVIDENCE)

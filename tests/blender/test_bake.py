@@ -249,3 +249,18 @@ def test_a_linked_face_is_baked_on_its_override(face, tmp_path):
     happy = np.interp(np.arange(1, 61), [1, 12], [0.0, 1.0])
     model = blood_over_time(Controls(np.arange(1, 61) / 24.0, {"happy": happy}))
     assert value == pytest.approx(model["cheeks", "hemoglobin"][-1], abs=2e-8)
+
+
+def test_a_rash_is_baked_by_its_own_slow_time(face):
+    armature, skin = face
+    controls.add_controls(armature, states=("rash",))
+    blood.drive_blood(armature, skin, BLOOD.channels(blood.blood_sliders(armature)).values())
+    keys = np.array([1.0, 2.0, 120.0]), np.array([0.0, 1.0, 1.0])
+    set_keys(action_curve(armature, path_of("rash")), *keys)
+    assert played(skin, 60)["blood_feature_rash"] == pytest.approx(1.0)  # live, settled
+    bake.bake_blood(skin, armature, bpy.context.scene)
+    frames = np.arange(1, 121)
+    course = blood_over_time(Controls(frames / 24.0, {"rash": np.interp(frames, *keys)}))["rash", "feature"]
+    found = [played(skin, frame)["blood_feature_rash"] for frame in (1, 60, 120)]
+    assert found == pytest.approx([course[0], course[59], course[119]], abs=1e-6)
+    assert 0.0 < found[2] < 0.1  # five seconds of some minutes

@@ -124,6 +124,21 @@ def test_grown_factors_are_what_skin_says(monkeypatch):
     assert difference(seen(thing, 1), said(**there)) < 1.5
 
 
+def test_what_a_state_brings_out_follows_the_object():
+    """One material: its strength is a property of the object, and more of it than the whole layer is the whole layer."""
+    plan = make_plan(Scene(default_skin() | {"oil": 0.0}, (Frame("0", {"rash": 1.0}),), {"anatomy": 0.0}))
+    maps = {"keyed_rash": halves([0.0, 0.0, 0.0, 0.0], [1.2, 0.0, 0.0, 0.1]), "keyed_rash_height": halves([0.0], [0.0])}
+    thing = patch(lambda: build_skin_material("skin", plan, maps))
+    skin = default_skin()
+    for strength in (0.0, 0.5, 1.0, 2.0):
+        thing["blood_feature_rash"] = strength
+        thing.update_tag()
+        held = min(strength, 1.0)
+        there = {"hemoglobin": skin["hemoglobin"] * np.exp(1.2 * held), "oxygenation": skin["oxygenation"] + 0.1 * held}
+        assert difference(seen(thing, 1), said(**there)) < 1.5, strength
+    assert difference(seen(thing, -1), said()) < 1.5
+
+
 def test_a_residual_multiplies_and_never_makes_light():
     plan = plan_of({"residual": {}})
     thing = patch(lambda: build_skin_material("skin", plan, {"residual": halves([0.4, 0.7, 1.0], [9.0, 9.0, 9.0])}))

@@ -15,6 +15,8 @@ from sanguine.domain.blood import (
     MOOD_SUFFIX,
     ELSEWHERE,
     EVIDENCE,
+    FEATURE,
+    FEATURES,
     STATES,
     blood_change,
     read_anatomy,
@@ -111,7 +113,7 @@ def test_a_systemic_state_reaches_all_skin(state):
 
 
 def test_every_state_and_every_emotion_moves_blood():
-    assert set(STATES) == {"blush", *SYSTEMIC}
+    assert set(STATES) == {"blush", "rash", *SYSTEMIC}
     assert all(settled({name: 1.0}) for name in BLOOD_DRIVERS)
 
 
@@ -174,7 +176,7 @@ def evidence_is_of(source, region):
 
 def change_rows():
     table = tomllib.loads(rigs_path("blood.toml").read_text())
-    return [(group["name"], row) for kind in ("emotion", "state") for group in table[kind] for row in group["change"]]
+    return [(group["name"], row) for kind in ("emotion", "state") for group in table[kind] for row in group.get("change", ())]
 
 
 def test_no_change_goes_against_its_own_sources():
@@ -200,6 +202,24 @@ def test_what_no_source_tells_of_its_region_has_a_note():
 def test_a_size_without_a_source_is_called_a_guess():
     for name, row in change_rows():
         assert row["magnitude"] == "guess" or re.search(r"\d", " ".join(EVIDENCE[s].magnitude for s in row["source"])), (name, row)
+
+
+def test_a_rash_is_the_strength_of_what_comes_out():
+    assert settled({"rash": 0.5}) == {("rash", FEATURE): 0.5}
+    (channel,) = BLOOD.channels(["rash"]).values()
+    assert channel.property_name == "blood_feature_rash" and (channel.low, channel.high) == (0.0, 1.0)
+    assert "tattoo" not in FEATURES  # ink does not come and go
+
+
+@pytest.mark.parametrize(
+    ("feature", "message"),
+    [('"rsh"', "rash: feature: rsh: no such feature, did you mean 'rash'?"), ('""', "rash: change: it changes nothing")],
+)
+def test_a_state_without_anything_says_so(tmp_path, feature, message):
+    broken = tmp_path / "blood.toml"
+    broken.write_text(rigs_path("blood.toml").read_text().replace('feature = "rash"', f"feature = {feature}"))
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_blood(broken, ANATOMY, EVIDENCE, STATES)
 
 
 def test_what_is_systemic_reaches_the_skin_between_the_regions():

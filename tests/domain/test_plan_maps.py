@@ -65,6 +65,49 @@ def test_a_feature_widens_what_it_changes(monkeypatch):
     assert "color grown = " in text and "float grown_oxygenation = " in text and "relief" not in sources(plan)
 
 
+def brought_out(level, **strengths):
+    """A still whose state of the body brings a rash out, as far as `level`."""
+    return Scene(default_skin(), (Frame("still", {"rash": level}),), {"anatomy": 0.0, "oil": 0.0, **strengths}, ("cheeks",))
+
+
+def test_a_state_brings_a_feature_out_by_a_strength_of_its_own():
+    plan = make_plan(brought_out(0.5))
+    rash = grown.ROWS["rash"]
+    most = {change["channel"]: change["high"] for change in rash["changes"]}
+    assert plan.maps == ("keyed_rash", "keyed_rash_height")
+    assert axes(plan)["hemoglobin"].high == pytest.approx(default_skin()["hemoglobin"] * math.exp(0.5 * most["log_hemoglobin"]))
+    assert axes(plan)["oxygenation"].high == pytest.approx(default_skin()["oxygenation"] + 0.5 * most["oxygenation"])
+    inputs = {item.name: item.source for fragment in plan.fragments for item in fragment.inputs}
+    assert inputs["blood_feature_rash"] == "object" and inputs["keyed_rash"] == "map"
+    text = sources(plan)
+    assert "keyed_rash[0] * clamp(blood_feature_rash, 0.0, 1)" in text["chromophores"] and "grown" not in inputs
+    assert "keyed_rash_height[0] * clamp(blood_feature_rash, 0.0, 1)" in text["relief"]
+    assert "state of the body" in plan.decisions["rash"].because and plan.decisions["rash"].frames == ("still",)
+
+
+def test_what_is_brought_out_comes_on_top_of_what_is_there():
+    """Together never more than the whole layer; and a layer that is there in full leaves nothing to bring out."""
+    plan, full = make_plan(brought_out(1.0, rash=0.3)), make_plan(brought_out(1.0, rash=1.0))
+    assert set(plan.maps) == {"grown", "grown_height", "keyed_rash", "keyed_rash_height"}
+    assert "clamp(blood_feature_rash, 0.0, 0.7)" in sources(plan)["chromophores"]
+    assert axes(plan)["hemoglobin"].high == pytest.approx(axes(full)["hemoglobin"].high)
+    assert set(full.maps) == {"grown", "grown_height"}
+
+
+def test_a_layer_that_is_painted_says_how_far_it_goes():
+    before = make_plan(brought_out(0.5))
+    layer = np.zeros((2, 2, 4), dtype=np.float32)
+    layer[0, 0, 0] = 0.8
+    after = reached(before, {"keyed_rash": {1001: layer}, "keyed_rash_height": {1001: np.zeros((2, 2, 1), np.float32)}})
+    assert axes(after)["hemoglobin"].high == pytest.approx(default_skin()["hemoglobin"] * math.exp(0.4))
+    assert "oxygenation" not in axes(after) and after.maps == before.maps
+
+
+def test_a_state_that_is_not_there_brings_nothing_out():
+    plan = make_plan(brought_out(0.0))
+    assert plan.maps == () and "keyed" not in "".join(sources(plan).values())
+
+
 def test_painted_features_reach_as_far_as_their_sum(monkeypatch):
     """Two features that hardly meet: the table holds what the map holds, and the shader stays as it is."""
     declare(monkeypatch, "spotted", log_melanin=(0.0, 1.5))

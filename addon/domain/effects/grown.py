@@ -1,6 +1,8 @@
 """Features that grow on the skin, freckles, moles, vessels and the like: one effect per row of the native core.
 
-All of them share three maps of sums over their layers, each made only when an active feature writes to it.
+All of them share three maps of sums over their layers, each made only when an active feature writes to it. A feature
+that a state of the body brings out (`feature` in rigs/blood.toml) has its layer in maps of its own besides, times a
+strength that the object holds and that moves: on top of its own strength, together no more than the whole layer.
 """
 
 from __future__ import annotations
@@ -10,6 +12,8 @@ from typing import Any
 
 import sanguine_core
 
+from ..blood import FEATURE, blood_property
+from .blood_change import frame_changes
 from .effect import (
     Activation,
     Bounds,
@@ -33,6 +37,8 @@ MAPS = {
 _FACTORS = {"log_hemoglobin": "hemoglobin", "log_melanin": "melanin", "log_oil": "oil"}
 _CHANGES = ("oxygenation", "ink_per_mm")
 
+_KEYED, _HEIGHT = "keyed_", "_height"
+
 ROWS: dict[str, dict[str, Any]] = {row["id"]: row for row in sanguine_core.features()}
 
 
@@ -42,9 +48,42 @@ def written(scene: Scene) -> frozenset[str]:
     return frozenset(change["channel"] for row in active for change in row["changes"])
 
 
+def channels_of(name: str) -> tuple[str, ...] | None:
+    """What the channels of a painted map hold; None of any other map."""
+    if name.startswith(_KEYED):
+        return MAPS["grown_height" if name.endswith(_HEIGHT) else "grown"]
+    return MAPS.get(name)
+
+
+def feature_of(name: str) -> str | None:
+    """The feature that a map holds at full strength, all by itself; None of sums."""
+    return name.removeprefix(_KEYED).removesuffix(_HEIGHT) if name.startswith(_KEYED) else None
+
+
+def keyed(scene: Scene) -> dict[str, float]:
+    """Features that a state brings out at some moment, and their highest strength then, on top of their own."""
+    found: dict[str, float] = {}
+    for frame in scene.frames:
+        for (feature, quantity), (_, high) in frame_changes(frame, scene.live).items():
+            if quantity == FEATURE:
+                found[feature] = max(found.get(feature, 0.0), min(high, _left(scene, feature)))
+    return {feature: high for feature, high in found.items() if high > 0.0}
+
+
+def _left(scene: Scene, feature: str) -> float:
+    """How much of its layer its own strength leaves."""
+    return 1.0 - scene.strengths.get(feature, 0.0)
+
+
 def _maps(scene: Scene, row: dict[str, Any]) -> tuple[str, ...]:
     mine = {change["channel"] for change in row["changes"]}
-    return tuple(name for name, channels in MAPS.items() if mine & set(channels))
+    wanted = [name for name, channels in MAPS.items() if mine & set(channels)]
+    if row["id"] in keyed(scene):
+        if scene.strengths.get(row["id"], 0.0) == 0.0:
+            wanted = []
+        names = {"grown": f"{_KEYED}{row['id']}", "grown_height": f"{_KEYED}{row['id']}{_HEIGHT}"}
+        wanted += [names[name] for name in names if mine & set(MAPS[name])]
+    return tuple(wanted)
 
 
 def _fragments(scene: Scene, row: dict[str, Any]) -> tuple[Fragment, ...]:
@@ -76,12 +115,50 @@ def _fragments(scene: Scene, row: dict[str, Any]) -> tuple[Fragment, ...]:
             inputs=(ShaderInput("grown_height", "color", "map", "grown_height"),),
         ),
     }
-    return tuple(made[name] for name in _maps(scene, row))
+    own = tuple(made[name] for name in _maps(scene, row) if name in made)
+    return (*own, *_keyed_fragments(scene)) if row["id"] in keyed(scene) else own
+
+
+def _keyed_fragments(scene: Scene) -> tuple[Fragment, ...]:
+    """One for the colour and one for the height of all features that are keyed."""
+    terms: dict[str, list[str]] = {}
+    inputs: dict[str, list[ShaderInput]] = {"grown": [], "grown_height": []}
+    for feature in keyed(scene):
+        name, slider = f"{_KEYED}{feature}", blood_property(FEATURE, feature)
+        read = {
+            **{channel: f"{name}[{MAPS['grown'].index(channel)}]" for channel in _FACTORS},
+            "oxygenation": f"{name}_oxygenation",
+            "height_mm": f"{name}{_HEIGHT}[0]",
+        }
+        mine = [change["channel"] for change in ROWS[feature]["changes"]]
+        for channel in mine:
+            terms.setdefault(channel, []).append(f"{read[channel]} * clamp({slider}, 0.0, {_left(scene, feature):g})")
+        if set(mine) & set(_FACTORS):
+            inputs["grown"].append(ShaderInput(name, "color", "map", name))
+        if "oxygenation" in mine:
+            inputs["grown"].append(ShaderInput(f"{name}_oxygenation", "float", "map:alpha", name))
+        if "height_mm" in mine:
+            inputs["grown_height"].append(ShaderInput(f"{name}{_HEIGHT}", "color", "map", f"{name}{_HEIGHT}"))
+        for kind in inputs:
+            if set(mine) & set(MAPS[kind]):
+                inputs[kind].append(ShaderInput(slider, "float", "object", slider))
+    sums = {f"KEYED_{channel.upper()}": f"({' + '.join(added)})" for channel, added in terms.items()}
+    height = sums.pop("KEYED_HEIGHT_MM", "")
+    made = []
+    if inputs["grown"]:
+        made.append(Fragment("chromophores", "keyed.osl", tuple(inputs["grown"]), sums))
+    if height:
+        made.append(Fragment("relief", "keyed_height.osl", tuple(inputs["grown_height"]), {"KEYED_HEIGHT_MM": height}))
+    return tuple(made)
 
 
 def _bounds(scene: Scene, bounds: Bounds, row: dict[str, Any]) -> Bounds:
+    brought_out = keyed(scene).get(row["id"], 0.0)
     for change in row["changes"]:
         low, high = _reach(scene, row, change)
+        if brought_out:
+            layer = scene.maps.get(f"{_KEYED}{row['id']}", {}).get(change["channel"], (change["low"], change["high"]))
+            low, high = low + brought_out * min(0.0, layer[0]), high + brought_out * max(0.0, layer[1])
         chromophore = _FACTORS.get(change["channel"], change["channel"])
         if chromophore not in bounds:  # oil and height have no axis
             continue
@@ -96,8 +173,10 @@ def _bounds(scene: Scene, bounds: Bounds, row: dict[str, Any]) -> Bounds:
 def _reach(scene: Scene, row: dict[str, Any], change: dict[str, Any]) -> Interval:
     """What a feature may add to its channel; of a map that is painted, what the sum was found to be, with the first."""
     found = {channel: interval for name in MAPS for channel, interval in scene.maps.get(name, {}).items()}
+    strength = scene.strengths.get(row["id"], 0.0)
+    if strength == 0.0:
+        return 0.0, 0.0
     if change["channel"] not in found:
-        strength = scene.strengths[row["id"]]
         return strength * change["low"], strength * change["high"]
     first = next(
         name
@@ -108,7 +187,11 @@ def _reach(scene: Scene, row: dict[str, Any], change: dict[str, Any]) -> Interva
 
 
 def _activate(scene: Scene, row: dict[str, Any]) -> Activation:
-    return strength_activation(scene, row["id"])
+    own = strength_activation(scene, row["id"])
+    if own.active or row["id"] not in keyed(scene):
+        return own
+    frames = tuple(f.id for f in scene.frames if (row["id"], FEATURE) in frame_changes(f, scene.live))
+    return Activation(True, "a state of the body brings it out", frames)
 
 
 def _effect(row: dict[str, Any]) -> Effect:
