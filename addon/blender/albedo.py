@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 from ..app.inverting import invert_tiles
+from ..app.tasks import Progress, Task, Tasks, run_tasks
 from ..domain.effects import residual, skin_map
 from .colour import working_space
 from .images import data_image, scene_linear, store_range
 from .properties import skin_of
+
+READ_FROM = "sanguine_read_from"
+"""Custom property of an image that was read from a picture: the picture's name."""
 
 _BYTE = 1 / 255
 
@@ -18,15 +24,27 @@ def read_picture(face: bpy.types.Object, image: bpy.types.Image, shading: str = 
 
     Raises InputError for a picture that cannot be read.
     """
-    made = invert_tiles(
-        scene_linear(image), working_space(), skin_of(face), shading=shading, quantum=0.0 if image.is_float else _BYTE
-    )
+    return run_tasks(picture_tasks(face, image, shading))
+
+
+def picture_tasks(face: bpy.types.Object, image: bpy.types.Image, shading: str = "auto") -> Tasks:
+    """`read_picture` in steps: computing is yielded as a task."""
+    pixels, space, skin = scene_linear(image), working_space(), skin_of(face)
+    quantum = 0.0 if image.is_float else _BYTE
+
+    def invert(progress: Progress) -> dict[str, Any]:
+        return invert_tiles(
+            pixels, space, skin, shading=shading, quantum=quantum, progress=lambda _what, done, total: progress(done, total)
+        )
+
+    made = yield Task("Reading the picture", invert)
     before = [getattr(face.sanguine, name) for name in (skin_map.MAP, residual.MAP)]
     # Amounts take 32 bits: half floats round to 1 in 2000 of a fraction, which shows as bands where melanin is thin.
     blood = data_image(f"{image.name} skin", made["skin_map"])
     store_range(blood, made["ranges"])  # a picture says nothing of oil: the face's own slider stays
-    face.sanguine.skin_map = blood
-    face.sanguine.residual = data_image(f"{image.name} residual", made["residual"], half=True)
+    over = data_image(f"{image.name} residual", made["residual"], half=True)
+    blood[READ_FROM] = over[READ_FROM] = image.name
+    face.sanguine.skin_map, face.sanguine.residual = blood, over
     for old in before:
         if old is not None and not old.users:
             bpy.data.images.remove(old)

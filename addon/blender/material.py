@@ -6,7 +6,8 @@ file renders the same without the add-on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Iterator, Mapping
 
 import bpy
 
@@ -35,16 +36,19 @@ def _is_half(key: str) -> bool:
     return key in _HALF or grown.channels_of(key) is not None
 
 
+_NUMBERED = re.compile(r"\.\d{3}$")
+
 _BASE = {"skin_hemoglobin": "hemoglobin", "skin_oxygenation": "oxygenation", "skin_melanin": "melanin"}
 # Heights come in mm; the Bump node wants the height of "1" in scene units.
 _MM_PER_M = 1000.0
 
 
 def build_skin_material(
-    name: str, plan: Plan, maps: Mapping[str, Map], progress: Callable[[int, int], bool] | None = None
+    name: str, plan: Plan, maps: Mapping[str, Map], table: Table | None = None
 ) -> bpy.types.Material:
-    """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`."""
-    table = bake(plan.axes, plan.skin, working_space(), progress, plan.settings.lobes)
+    """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`. table: solved here if left out."""
+    if table is None:
+        table = bake(plan.axes, plan.skin, working_space(), lobes=plan.settings.lobes)
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # since Blender 5.0 there always is one
         material.use_nodes = True
@@ -63,19 +67,36 @@ def build_skin_material(
 
 def remove_skin_material(material: bpy.types.Material) -> None:
     """Removes a material of `build_skin_material` with the group, images and texts that were made for it alone."""
-    groups = [node.node_tree for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup"]
+    groups = _groups(material)
     bpy.data.materials.remove(material)
     for group in groups:
-        images = {
-            node.image
-            for node in group.nodes
-            if node.bl_idname == "ShaderNodeTexImage" and node.label not in _OF_THE_FACE
-        }
-        texts = {node.script for node in group.nodes if node.bl_idname == "ShaderNodeScript"}
+        parts = set(_parts(group))
         if not group.users:
             bpy.data.node_groups.remove(group)
         # Blender gives every text a fake user.
-        bpy.data.batch_remove([held for held in images | texts if held and held.users == int(held.use_fake_user)])
+        bpy.data.batch_remove([held for held in parts if held.users == int(held.use_fake_user)])
+
+
+def number_free(material: bpy.types.Material) -> None:
+    """Takes off the numbers (".001") that Blender put behind names while the skin before this one still had them."""
+    for group in _groups(material):
+        for item in (material, group, *_parts(group)):
+            if _NUMBERED.search(item.name):
+                item.name = _NUMBERED.sub("", item.name)  # a name that is taken gets a number again
+
+
+def _groups(material: bpy.types.Material) -> list[bpy.types.NodeTree]:
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    return [node.node_tree for node in nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
+
+
+def _parts(group: bpy.types.NodeTree) -> Iterator[bpy.types.ID]:
+    """Images and texts of a skin's group, those that come with the face apart."""
+    for node in group.nodes:
+        if node.bl_idname == "ShaderNodeTexImage" and node.label not in _OF_THE_FACE and node.image:
+            yield node.image
+        elif node.bl_idname == "ShaderNodeScript" and node.script:
+            yield node.script
 
 
 def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map]) -> bpy.types.NodeTree:

@@ -12,10 +12,11 @@ from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from ..domain.vascular import reach
 from .blood import blood_model, blood_sliders
-from .controls import CONTROL_BONE, add_controls, drive_shape_keys
+from .controls import CONTROL_BONE, DriveReport, add_controls, drive_shape_keys
 from .material import MARK
 from .osl import missing_osl
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
+from .removal import all_or_nothing, controls_of, mark_rig, nothing_left_behind, remember_keys
 from .skin import apply_skin, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
 
@@ -26,12 +27,6 @@ def active_face(context: bpy.types.Context) -> bpy.types.Object | None:
     if obj is not None and obj.type == "ARMATURE":
         return next((child for child in obj.children if child.type == "MESH" and face_regions(child)), None)
     return obj if obj is not None and obj.type == "MESH" else None
-
-
-def controls_of(face: bpy.types.Object) -> bpy.types.Object | None:
-    """The armature that carries the face's controls."""
-    rigs = [face.parent, *(m.object for m in face.modifiers if m.type == "ARMATURE")]
-    return next((rig for rig in rigs if rig is not None and rig.type == "ARMATURE"), None)
 
 
 def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
@@ -88,14 +83,16 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
+        context.view_layer.update()  # scales that a script has just set count too
+        slot = skin_slot(face)
         try:
-            rig = controls_of(face) or _new_rig(context, face)
-            add_controls(rig)
-            driven = drive_shape_keys(rig, [child for child in (face, *rig.children) if child.type == "MESH"])
-            measure_maps(face)
-            regions = find_face_regions(face)
-            plan = live_plan(face)
-            material = apply_skin(face, rig, plan, skin_slot(face))
+            with all_or_nothing(face, slot):
+                rig = controls_of(face) or new_rig(context, face)
+                driven = put_controls(rig, face)
+                measure_maps(face)
+                regions = find_face_regions(face)
+                plan = live_plan(face)
+                material = apply_skin(face, rig, plan, slot)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -173,7 +170,8 @@ class SANGUINE_OT_read_picture(bpy.types.Operator):
             self.report({"ERROR"}, f"no picture '{self.image}'" if self.image else "the face's material has no picture: name one")
             return {"CANCELLED"}
         try:
-            report = read_picture(face, image, self.shading)
+            with nothing_left_behind():
+                report = read_picture(face, image, self.shading)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -216,9 +214,19 @@ class SANGUINE_OT_draw_person(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Object:
+def put_controls(rig: bpy.types.Object, face: bpy.types.Object) -> DriveReport:
+    """Sliders on the rig, and the shape keys of its meshes listening to them."""
+    add_controls(rig)
+    meshes = [mesh for mesh in dict.fromkeys((face, *rig.children)) if mesh.type == "MESH"]
+    for mesh in meshes:
+        remember_keys(mesh, rig)
+    return drive_shape_keys(rig, meshes)
+
+
+def new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Object:
     """An armature for the controls of a face that has none; it does not deform anything."""
     rig = bpy.data.objects.new(f"{face.name} controls", bpy.data.armatures.new(f"{face.name} controls"))
+    mark_rig(rig)
     face.users_collection[0].objects.link(rig)
     world = face.matrix_world.copy()
     rig.parent = face.parent

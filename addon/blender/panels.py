@@ -9,6 +9,7 @@ from ..domain.effects import EFFECTS, Growth, grown, residual, skin_map
 from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.quality import preset
+from .adopt import SANGUINE_OT_adopt, SANGUINE_OT_remove_skin, skinned_face
 from .animation import (
     SANGUINE_OT_add_feeling,
     SANGUINE_OT_add_poses,
@@ -33,6 +34,7 @@ from .operators import (
 )
 from .osl import missing_osl
 from .properties import strength_property
+from .removal import has_skin
 
 
 class _SidebarPanel:
@@ -47,8 +49,13 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.operator(SANGUINE_OT_apply_skin.bl_idname, icon="MATERIAL")
         face = active_face(context)
+        if face is not None and not has_skin(face):
+            layout.operator_context = "INVOKE_DEFAULT"
+            layout.operator(SANGUINE_OT_adopt.bl_idname, icon="USER")
+        layout.operator(SANGUINE_OT_apply_skin.bl_idname, icon="MATERIAL")
+        if skinned_face(context) is not None:
+            layout.operator(SANGUINE_OT_remove_skin.bl_idname, icon="TRASH")
         if missing_osl():
             layout.label(text="This Blender has no OSL: no skin", icon="ERROR")
         elif face and context.scene.render.engine != "CYCLES" and any(m and MARK in m for m in face.data.materials):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import animation, capture, operators, panels, properties
+from . import adopt, animation, capture, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *animation.CLASSES, *capture.CLASSES, *panels.CLASSES)
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *animation.CLASSES, *capture.CLASSES, *panels.CLASSES)
 _commands: list[object] = []
 
 

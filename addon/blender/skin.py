@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import bpy
+import numpy as np
 
 from ..app.maps import Surface, bake_maps, reached, strain_coefficients, wrinkle_coefficients
+from ..app.tasks import Progress, Task, Tasks, run_tasks
 from ..domain.effects import strain, wrinkles
 from ..domain.errors import InputError
+from ..domain.lut import bake
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
 from .bake import clear_bake
 from .blood import drive_settled, remove_blood
-from .material import MARK, Map, build_skin_material, remove_skin_material
+from .colour import working_space
+from .material import MARK, Map, build_skin_material, number_free, remove_skin_material
 from .osl import missing_osl
 from .properties import images_of
 from .strain import drive_components, remove_components
@@ -26,22 +30,47 @@ def apply_skin(
     armature: bpy.types.Object | None,
     plan: Plan,
     slot: int = 0,
-    progress: Callable[[int, int], bool] | None = None,
+    progress: Progress | None = None,
     given: Mapping[str, Map] | None = None,
 ) -> bpy.types.Material:
     """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`.
 
     given: the maps that came with the face, by id; left out, those that its properties point to.
     """
+    return run_tasks(skin_tasks(face, armature, plan, slot, given), progress)
+
+
+def skin_tasks(
+    face: bpy.types.Object,
+    armature: bpy.types.Object | None,
+    plan: Plan,
+    slot: int = 0,
+    given: Mapping[str, Map] | None = None,
+) -> Tasks:
+    """`apply_skin` in steps: computing is yielded as tasks. Returns the material.
+
+    The skin that was there goes when the new one stands, and stays where that fails.
+    """
     if why := missing_osl():
         raise InputError(f"{face.name}: {why}")
     surface = read_surface(face) if plan.maps else None
-    maps = _maps(face, surface, plan, images_of(face) if given is None else given, progress) if surface else {}
-    plan = reached(plan, maps)
+    maps: dict[str, Map] = {}
+    if surface:
+        sizes = needed_sizes(face, surface, plan)
+        tiles = yield Task("Painting maps", lambda progress: bake_maps(plan, surface, sizes, progress=progress))
+        maps = _maps(face, surface, plan, tiles, images_of(face) if given is None else given)
+    plan, space = reached(plan, maps), working_space()
+    table = yield Task("Solving skin", lambda progress: bake(plan.axes, plan.skin, space, progress, plan.settings.lobes))
+    components = []
+    for images, solve, one_sided in (
+        (strain.IMAGES, strain_coefficients, False),
+        (wrinkles.IMAGES, wrinkle_coefficients, True),
+    ):
+        if set(images) & set(maps):
+            coefficients = yield Task("Following shape keys", lambda _progress, solve=solve: solve(surface))
+            components.append((images, coefficients, one_sided))
     before = face.material_slots[slot].material if face.material_slots else None
-    if before is not None and MARK in before and before.users == 1:
-        remove_skin_material(before)
-    material = build_skin_material(f"{face.name} skin", plan, maps, progress)
+    material = build_skin_material(f"{face.name} skin", plan, maps, table)
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
     if "rest_mm" in inputs:
         store_rest(face)
@@ -49,15 +78,21 @@ def apply_skin(
         face.material_slots[slot].material = material  # the slot knows whether it belongs to the object or the mesh
     else:
         face.data.materials.append(material)
-    clear_bake(face)
-    remove_blood(face)
-    if armature is not None:
-        drive_settled(armature, face, inputs)
-    remove_components(face)
-    if set(strain.IMAGES) & set(maps):
-        drive_components(face, strain.IMAGES, surface.keys.names, strain_coefficients(surface), one_sided=False)
-    if set(wrinkles.IMAGES) & set(maps):
-        drive_components(face, wrinkles.IMAGES, surface.keys.names, wrinkle_coefficients(surface), one_sided=True)
+    try:
+        clear_bake(face)
+        remove_blood(face)
+        if armature is not None:
+            drive_settled(armature, face, inputs)
+        remove_components(face)
+        for images, coefficients, one_sided in components:
+            drive_components(face, images, surface.keys.names, coefficients, one_sided)
+    except BaseException:
+        face.material_slots[slot].material = before
+        remove_skin_material(material)
+        raise
+    if before is not None and MARK in before and not before.users:
+        remove_skin_material(before)
+        number_free(material)
     return material
 
 
@@ -65,11 +100,10 @@ def _maps(
     face: bpy.types.Object,
     surface: Surface,
     plan: Plan,
+    tiles: Mapping[str, Mapping[int, np.ndarray]],
     given: Mapping[str, Map],
-    progress: Callable[[int, int], bool] | None,
 ) -> dict[str, Map]:
     """Map id -> image, or images by UDIM tile where the layout has more than the first."""
-    tiles = bake_maps(plan, surface, needed_sizes(face, surface, plan), progress=progress)
     maps: dict[str, Map] = {
         name: images[FIRST_TILE] if list(images) == [FIRST_TILE] else images for name, images in tiles.items()
     }
@@ -95,9 +129,16 @@ def needed_sizes(face: bpy.types.Object, surface: Surface, plan: Plan) -> MapSiz
 
 
 def skin_slot(face: bpy.types.Object) -> int:
-    """The slot that holds the skin: the one named so, or the one that most faces use."""
+    """The slot that holds the skin: ours, or the one named so, or the one that most faces use."""
+    if (ours := our_slot(face)) is not None:
+        return ours
     for i, slot in enumerate(face.material_slots):
         if "skin" in slot.name.lower():
             return i
     indices = [polygon.material_index for polygon in face.data.polygons]
     return max(set(indices), key=indices.count) if indices else 0
+
+
+def our_slot(face: bpy.types.Object) -> int | None:
+    """The slot that holds a skin of ours."""
+    return next((i for i, slot in enumerate(face.material_slots) if slot.material and MARK in slot.material), None)

@@ -12,9 +12,10 @@ from ..app.maps import Surface
 from ..domain.effects.pressure import ATTRIBUTE
 from ..domain.effects.regions import FACE_REGIONS
 from ..domain.errors import InputError
-from ..domain.face_regions import find_regions
+from ..domain.face_regions import FoundRegions, find_regions
 from ..domain.head import load_regions
 from ..domain.head.model import ShapeKey
+from ..domain.head_size import HeadSize, head_size
 from ..domain.naming import recognise
 from ..domain.resources import rigs_path
 from ..domain.strain import ShapeKeys
@@ -46,21 +47,42 @@ def find_face_regions(obj: bpy.types.Object) -> str:
     """Gives a face without masks those that its shape keys tell. Returns what came of it, one line, "" if it has masks."""
     if face_regions(obj):
         return ""
+    found = _found(obj, _arkit_moves(obj))
+    store_regions(obj, {region: mask for region, mask in found.regions.items() if region in FACE_REGIONS})
+    return found.because
+
+
+def size_of_head(obj: bpy.types.Object) -> HeadSize:
+    """How tall it is as it stands in the scene: its object's scale and the scene's unit count."""
+    moves = _arkit_moves(obj)
+    landmarks = _found(obj, moves).landmarks
+    jaw = np.linalg.norm(moves["jawOpen"], axis=1) if "jawOpen" in moves else None
+    position_mm = _position_mm(obj)
+    if not landmarks:  # as it stands: importers leave Y up in the mesh and turn the object
+        turn = np.array(obj.matrix_world.to_quaternion().to_matrix(), dtype=np.float32)
+        position_mm = position_mm @ turn.T
+    return head_size(position_mm, {name: 1000.0 * place for name, place in landmarks.items()}, jaw)
+
+
+def _arkit_moves(obj: bpy.types.Object) -> dict[str, np.ndarray]:
+    """ARKit key -> (V, 3) displacement at value 1, in metres, of the keys that the mesh has under any name."""
+    to_metres = _position_scale_mm(obj) / 1000.0
+    moves: dict[str, np.ndarray] = {}
+    blocks = obj.data.shape_keys.key_blocks if obj.data.shape_keys else {}
+    for name, arkit in recognise(blocks.keys()).strongest().items():
+        moved = (_key_positions(blocks[name]) - _key_positions(blocks[name].relative_key)) * to_metres
+        moves[arkit] = moves[arkit] + moved if arkit in moves else moved  # browInnerUp of rigs that have it by side
+    return moves
+
+
+def _found(obj: bpy.types.Object, moves: Mapping[str, np.ndarray]) -> FoundRegions:
     mesh = obj.data
     mesh.calc_loop_triangles()
     triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
-    to_metres = _position_scale_mm(obj) / 1000.0
-    moves: dict[str, np.ndarray] = {}
-    blocks = mesh.shape_keys.key_blocks if mesh.shape_keys else {}
-    for name, arkit in recognise(blocks.keys()).strongest().items():
-        moved = (_key_positions(blocks[name]) - _key_positions(blocks[name].relative_key)) * to_metres
-        moves[arkit] = moves[arkit] + moved if arkit in moves else moved  # browInnerUp of rigs that have it by side
     indices = {name: np.flatnonzero(moved.any(axis=1)) for name, moved in moves.items()}
     keys = {name: ShapeKey(index, moves[name][index]) for name, index in indices.items()}
-    found = find_regions(_position_mm(obj) / 1000.0, triangles.reshape(-1, 3), keys, load_regions(rigs_path("regions.toml")))
-    store_regions(obj, {region: mask for region, mask in found.regions.items() if region in FACE_REGIONS})
-    return found.because
+    return find_regions(_position_mm(obj) / 1000.0, triangles.reshape(-1, 3), keys, load_regions(rigs_path("regions.toml")))
 
 
 def _key_positions(key: bpy.types.ShapeKey) -> np.ndarray:
@@ -84,9 +106,10 @@ def _position_mm(obj: bpy.types.Object) -> np.ndarray:
 
 
 def _position_scale_mm(obj: bpy.types.Object) -> np.ndarray:
-    """(3,) float32: mm per unit of the mesh, along its axes."""
+    """(3,) float32: mm per unit of the mesh, along its axes. Of a mirrored object the lengths: the mesh is not mirrored
+    with it, so its left stays left and its up stays up."""
     mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
-    return np.array(obj.matrix_world.to_scale(), dtype=np.float32) * np.float32(mm_per_unit)
+    return np.abs(np.array(obj.matrix_world.to_scale(), dtype=np.float32)) * np.float32(mm_per_unit)
 
 
 def pixel_mm(scene: bpy.types.Scene, obj: bpy.types.Object) -> float | None:

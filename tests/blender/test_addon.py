@@ -72,7 +72,7 @@ def test_a_mesh_without_uvs_gives_one_line(addon):
 def test_apply_gives_material_sliders_and_panel(addon, engine):
     bpy.context.scene.render.engine = engine
     face = grid()
-    assert draw(panels.SANGUINE_PT_main) == ["sanguine.apply_skin"]
+    assert draw(panels.SANGUINE_PT_main) == ["sanguine.adopt", "sanguine.apply_skin"]
     assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
     assert bpy.context.scene.render.engine == engine
     drawn = draw(panels.SANGUINE_PT_main)
