@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import sanguine_core
 
-from .facs import ACTION_UNITS, EMOTION_CONTROLS, shape_key_values
+from .facs import ACTION_UNITS, DEFAULT_EMOTIONS, EMOTION_CONTROLS, shape_key_values
 
 COMPONENTS = 8
 """Maps kept of each kind, four to an image. docs/strain.md has the error for other numbers."""
@@ -44,7 +44,7 @@ _SMOOTHING = 2  # rounds over the neighbours: strain is constant on a triangle, 
 _FOLD_SMOOTHING = 4
 _FACTORED_VERTICES = 4000
 # What counts when components are chosen, per row: emotions above action units above single keys.
-_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 3.0, 1.0, 0.3
+_DEFAULT_EMOTION_WEIGHT, _EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT = 4.5, 3.0, 1.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -239,9 +239,9 @@ def _asked_for(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     # Patterns are found on the whole face and driven by halves: one-sided poses would split them.
     emotions = _on_both_sides(names, poses(names, [{name: 1.0} for name in EMOTION_CONTROLS]))
     units = poses(names, [{control: 1.0} for u in ACTION_UNITS.values() if u.keys and not u.one_sided for control in u.whole])
-    weights = (_EMOTION_WEIGHT, _UNIT_WEIGHT, _KEY_WEIGHT)
-    rows = (emotions, units, np.eye(len(names)))
-    return np.concatenate(rows), np.concatenate([np.full(len(r), w) for r, w in zip(rows, weights, strict=True)])
+    weight = [_DEFAULT_EMOTION_WEIGHT if name in DEFAULT_EMOTIONS else _EMOTION_WEIGHT for name in EMOTION_CONTROLS]
+    weights = (weight, np.full(len(units), _UNIT_WEIGHT), np.full(len(names), _KEY_WEIGHT))
+    return np.concatenate((emotions, units, np.eye(len(names)))), np.concatenate(weights)
 
 
 # Sums run through einsum, not through BLAS: the same bytes for any number of threads.

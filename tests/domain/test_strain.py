@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sanguine.app.faces import example_head, head_surface
 from sanguine.domain import strain, wrinkles
-from sanguine.domain.facs import ACTION_UNITS, EMOTION_CONTROLS
+from sanguine.domain.facs import ACTION_UNITS, DEFAULT_EMOTIONS, EMOTION_CONTROLS
 from sanguine.domain.key_sums import key_sums
 from sanguine.domain.response import MAX_EXPRESSION
 
@@ -66,9 +66,12 @@ def test_components_follow_the_exact_strain_of_emotions(moving):
     exact = strain.blood_change(strain.log_area(moving.pose_strain(asked)))
     found = strain.blood_change(moving.welded_area.at(asked, moving.halves))
     error, signal = area_rms(moving, found - exact), area_rms(moving, exact)
-    # Delta E 0.1 is not seen, and doubling the blood is 4, so 0.0173 of its logarithm; the half is what eight
-    # components, made for ten emotions at once, leave of those that move the least.
-    assert (error < 0.0173).all() and (error < 0.5 * signal).all(), (error, error / signal)
+    first = np.isin(EMOTION_CONTROLS, DEFAULT_EMOTIONS)
+    # A hundredth of the blood is not seen (doubling it is Delta E 4); the quarter is what eight components leave of
+    # sadness, which moves the least.
+    assert (error < 0.01)[first].all() and (error < 0.25 * signal)[first].all(), (error, error / signal)
+    # Of the other emotions the components keep less, but Delta E 0.1 (0.0173 of the blood's logarithm) is not seen either.
+    assert (error < 0.0173).all() and (error < signal).all(), (error, error / signal)
 
 
 @pytest.mark.parametrize(("count", "share"), [(4, 0.95), (8, 0.70), (16, 0.45)])
