@@ -57,11 +57,7 @@ def size_of_head(obj: bpy.types.Object) -> HeadSize:
     moves = _arkit_moves(obj)
     landmarks = _found(obj, moves).landmarks
     jaw = np.linalg.norm(moves["jawOpen"], axis=1) if "jawOpen" in moves else None
-    position_mm = _position_mm(obj)
-    if not landmarks:  # as it stands: importers leave Y up in the mesh and turn the object
-        turn = np.array(obj.matrix_world.to_quaternion().to_matrix(), dtype=np.float32)
-        position_mm = position_mm @ turn.T
-    return head_size(position_mm, {name: 1000.0 * place for name, place in landmarks.items()}, jaw)
+    return head_size(_position_mm(obj), {name: 1000.0 * place for name, place in landmarks.items()}, jaw)
 
 
 def _arkit_moves(obj: bpy.types.Object) -> dict[str, np.ndarray]:

@@ -19,7 +19,7 @@ _CHIN = 0.5  # of the most that the jaw moves: what moves more is chin
 
 @dataclass(frozen=True)
 class HeadSize:
-    """height_mm: chin to crown, or the whole mesh where nothing tells its chin. factor: what the face should be scaled
+    """height_mm: chin to crown, or the longest side of the mesh where nothing tells its chin. factor: what the face should be scaled
     by, 1 if it is a head as it stands."""
 
     height_mm: float
@@ -28,8 +28,9 @@ class HeadSize:
 
     @property
     def line(self) -> str:
-        what = "the mesh is" if self.whole_mesh else "the head is"
-        said = f"{what} {self.height_mm:.4g} mm tall"
+        said = f"the head is {self.height_mm:.4g} mm tall"
+        if self.whole_mesh:
+            said = f"the mesh measures {self.height_mm:.4g} mm"
         if self.factor == 1.0:
             return said
         return f"{said}, a head has {HEAD_MM[0]:g} to {HEAD_MM[1]:g}: scale it by {self.factor:g}"
@@ -38,7 +39,7 @@ class HeadSize:
 def head_size(position_mm: np.ndarray, landmarks: Mapping[str, np.ndarray], jaw: np.ndarray | None = None) -> HeadSize:
     """The size of a head.
 
-    position_mm : (V, 3), Z up where no landmarks are. landmarks : those of `face_regions.FoundRegions`, in mm; may be empty.
+    position_mm : (V, 3), any side up. landmarks : those of `face_regions.FoundRegions`, in mm; may be empty.
     jaw : (V,) how far each point moves as the jaw opens, in any unit.
     """
     if len(position_mm) == 0:
@@ -46,7 +47,7 @@ def head_size(position_mm: np.ndarray, landmarks: Mapping[str, np.ndarray], jaw:
     position_mm = np.asarray(position_mm, dtype=np.float64)
     whole = not {"eye_left", "eye_right", "mouth"} <= set(landmarks) or jaw is None or not np.any(jaw > 0)
     if whole:
-        height = float(np.ptp(position_mm[:, 2]))
+        height = float(np.ptp(position_mm, axis=0).max())
     else:
         left, right, mouth = (np.asarray(landmarks[name], dtype=np.float64) for name in ("eye_left", "eye_right", "mouth"))
         eyes, across = (left + right) / 2, left - right

@@ -136,7 +136,7 @@ def test_it_says_what_it_found():
     face = make_face()
     said = adopted(face)
     assert said.lines[0].startswith("ict names: 8 of 9 shape keys are known; nothing does the work of ")
-    assert "240 mm tall" in said.lines[1]
+    assert "measures 240 mm" in said.lines[1]
     assert "the skin of the panel" in said.lines[2]
     other = make_face("other", keys=())
     other.vertex_groups.clear()
@@ -263,6 +263,25 @@ def test_two_faces_on_one_mesh(order):
         select(face)
         assert bpy.ops.sanguine.remove_skin() == {"FINISHED"}
     same(before)
+
+
+def test_a_copy_of_a_face_is_left_with_what_the_face_had():
+    face = make_face()
+    face.data.shape_keys.key_blocks["mouthSmile_L"].value = 0.3
+    bpy.ops.sanguine.apply_skin()
+    copy = face.copy()
+    copy.data = face.data.copy()
+    copy.name = "copy"
+    bpy.context.collection.objects.link(copy)
+    for one in (face, copy):
+        select(one)
+        assert bpy.ops.sanguine.remove_skin() == {"FINISHED"}
+    assert face.parent is copy.parent is None and not bpy.data.armatures and not bpy.data.texts and not bpy.data.node_groups
+    assert [one.material_slots[0].material.name for one in (face, copy)] == ["painted", "painted"]
+    assert sorted(face.keys()) == sorted(copy.keys()) and list(bpy.data.materials) == [bpy.data.materials["painted"]]
+    for one in (face, copy):
+        keys = one.data.shape_keys
+        assert keys.animation_data is None and keys.key_blocks["mouthSmile_L"].value == pytest.approx(0.3)
 
 
 def test_a_rig_of_ones_own_keeps_everything_but_ours():
