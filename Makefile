@@ -8,6 +8,9 @@ PYTHON ?= /usr/bin/python3.11
 # Every Blender module that `make matrix` tests beside the one in .venv.
 MATRIX := 4.2.23 5.0.1 5.2.3
 
+# Where `make window` keeps the Debian 13 with Blender 4.3.2 in it.
+WINDOW_ROOT ?= .cache/window
+
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check
@@ -32,7 +35,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix clean system
+.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix window clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -80,6 +83,9 @@ extension: native ## Build the Blender extension into dist/
 
 matrix: extension $(TEST_STAMP) ## Run the Blender tests on the other Blender versions
 	tools/matrix.sh $(MATRIX)
+
+window: setup extension ## Click through the panel in a real Blender's window (root; WINDOW_ROOT is its Debian 13 folder)
+	tools/window/run.sh $(WINDOW_ROOT) out/window $(PARTS)
 
 clean: ## Remove what was built (environments and downloads stay)
 	rm -rf build dist out $(NATIVE_STAMP)

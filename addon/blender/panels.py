@@ -126,6 +126,7 @@ class SANGUINE_PT_time(_FacePanel, bpy.types.Panel):
 
 
 class SANGUINE_PT_units(_FacePanel, bpy.types.Panel):
+    bl_idname = "SANGUINE_PT_units"
     bl_label = "Action Units"
 
     @classmethod
@@ -136,16 +137,27 @@ class SANGUINE_PT_units(_FacePanel, bpy.types.Panel):
         bone = rig_of(context).pose.bones[CONTROL_BONE]
         column = self.layout.column(align=True)
         for unit in ACTION_UNITS.values():
-            row = column.split(factor=0.7, align=True)
-            whole, name = f"AU{unit.id}", f"{unit.id} {unit.name}"
-            if whole in bone:
-                row.prop(bone, f'["{whole}"]', text=name, slider=True)
-            else:  # a wink is of one side
-                row.label(text=name)
-            sides = row.row(align=True)
-            for side in "RL":  # as one sees them, face to face
-                if whole + side in bone:
-                    sides.prop(bone, f'["{whole}{side}"]', text=side, slider=True)
+            if f"AU{unit.id}" in bone:
+                column.prop(bone, f'["AU{unit.id}"]', text=f"{unit.id} {unit.name}", slider=True)
+
+
+class SANGUINE_PT_sides(_FacePanel, bpy.types.Panel):
+    # Of its own: beside the slider of both sides there is no room, and the names would be cut.
+    bl_label = "Left and Right"
+    bl_parent_id = SANGUINE_PT_units.bl_idname
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return rig_of(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        bone = rig_of(context).pose.bones[CONTROL_BONE]
+        column = self.layout.column(align=True)
+        for unit in ACTION_UNITS.values():
+            row = column.row(align=True)
+            for side, text in (("R", f"{unit.id} right"), ("L", "left")):  # as one sees them, face to face
+                if f"AU{unit.id}{side}" in bone:
+                    row.prop(bone, f'["AU{unit.id}{side}"]', text=text, slider=True)
 
 
 class SANGUINE_PT_skin(_FacePanel, bpy.types.Panel):
@@ -212,6 +224,7 @@ CLASSES = (
     SANGUINE_PT_main,
     SANGUINE_PT_time,
     SANGUINE_PT_units,
+    SANGUINE_PT_sides,
     SANGUINE_PT_skin,
     SANGUINE_PT_features,
     SANGUINE_PT_picture,

@@ -45,7 +45,7 @@ class Layout:
     def column(self, **_):
         return self
 
-    row = split = column
+    row = column
 
 
 def draw(panel):
@@ -88,7 +88,7 @@ def test_apply_gives_material_sliders_and_panel(addon, engine):
 def test_every_unit_of_the_rig_has_its_sliders(addon):
     face = grid()
     bpy.ops.sanguine.apply_skin()
-    drawn = draw(panels.SANGUINE_PT_units)
+    drawn = draw(panels.SANGUINE_PT_units) + draw(panels.SANGUINE_PT_sides)
     assert {name for name in operators.emotion_bone(face).keys() if name.startswith("AU")} == {
         path[2:-2] for path in drawn if path.startswith('["AU')
     }

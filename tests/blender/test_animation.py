@@ -127,6 +127,7 @@ def test_poses_are_assets_that_hold_one_face_each(face):
     assert len(poses) == 1 + 3 * 4
     bpy.ops.sanguine.add_poses()
     assert len([a for a in bpy.data.actions if a.asset_data]) == len(poses)
+    assert not any(a.preview and a.preview.is_image_custom for a in poses.values())  # no shape keys: no face to show
     # Applied as the pose library does: the pose alone, at its frame.
     animation = face.parent.animation_data
     animation.action = poses["fear, extreme"]
@@ -135,6 +136,31 @@ def test_poses_are_assets_that_hold_one_face_each(face):
     bpy.context.scene.frame_set(1)
     bone = emotion_bone(face)
     assert [bone[name] for name in ("anger", "happy", "sad", "fear")] == pytest.approx([0.0, 0.0, 0.0, 1.5])
+
+
+def test_poses_show_the_face_that_they_make(face):
+    for name in ("Basis", "mouthSmileLeft"):
+        key_block = face.shape_key_add(name=name)
+        key_block.value = 0.0
+    # The grid lies flat: seen from the front it is a line. A smile lifts one end of it.
+    face.data.shape_keys.key_blocks["mouthSmileLeft"].data[-1].co.z += 0.2
+    bpy.ops.sanguine.apply_skin()
+    key(face, "happy", f1=0.0, f12=1.0)
+    bpy.context.scene.frame_set(1)
+    emotion_bone(face)["fear"] = 0.4
+    action = face.parent.animation_data.action
+    bpy.ops.sanguine.add_poses()
+    poses = {a.name.split(": ")[1]: a for a in bpy.data.actions if a.asset_data}
+
+    def covered(pose):
+        image = np.empty((*poses[pose].preview.image_size, 4), dtype=np.float32)
+        poses[pose].preview.image_pixels_float.foreach_get(image.ravel())
+        return (image[..., 3] > 0).sum()
+
+    # Keyed or not, the smile shows in its pose alone; what was set is set again.
+    assert covered("happy") > 0 and covered("neutral") == covered("sad") == 0
+    bone = emotion_bone(face)
+    assert (bone["happy"], bone["fear"]) == pytest.approx((0.0, 0.4)) and face.parent.animation_data.action == action
 
 
 def test_every_step_can_be_undone(face):
