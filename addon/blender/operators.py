@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from mathutils import Matrix
 
 from ..domain.effects import Frame, Scene
 from ..domain.blood import BLOOD, PRESSURE_CONTROL
@@ -224,16 +225,28 @@ def put_controls(rig: bpy.types.Object, face: bpy.types.Object) -> DriveReport:
 
 
 def new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Object:
-    """An armature for the controls of a face that has none; it does not deform anything."""
+    """An armature for the controls of a face that has none; it does not deform anything.
+
+    It stands between the face and its parent. The face's own location, rotation and scale stay as they are: they may
+    be animated.
+    """
     rig = bpy.data.objects.new(f"{face.name} controls", bpy.data.armatures.new(f"{face.name} controls"))
     mark_rig(rig)
     face.users_collection[0].objects.link(rig)
-    world = face.matrix_world.copy()
-    rig.parent = face.parent
-    rig.matrix_world = world
-    face.parent = rig
     context.view_layer.update()
-    face.matrix_world = world
+    own, above = face.matrix_world.copy(), Matrix()
+    if face.parent is not None:
+        shown = face.evaluated_get(context.evaluated_depsgraph_get())  # a vertex that is a parent has a place there alone
+        own = face.matrix_parent_inverse.inverted_safe() @ shown.matrix_local
+        above = face.matrix_world @ own.inverted_safe()
+        rig.parent, rig.parent_type = face.parent, face.parent_type
+        rig.parent_bone, rig.parent_vertices = face.parent_bone, face.parent_vertices
+        rig.matrix_parent_inverse = face.matrix_parent_inverse
+    rig.matrix_basis = own
+    context.view_layer.update()
+    face.parent, face.parent_type = rig, "OBJECT"
+    face.matrix_parent_inverse = rig.matrix_world.inverted_safe() @ above
+    context.view_layer.update()
     return rig
 
 

@@ -109,6 +109,7 @@ def remember(face: bpy.types.Object, slot: int) -> None:
         "attributes": [REST_ATTRIBUTE] if REST_ATTRIBUTE not in face.data.attributes else [],
         "parent_type": face.parent_type,
         "parent_bone": face.parent_bone,
+        "parent_vertices": list(face.parent_vertices),
         "parent_inverse": [list(row) for row in face.matrix_parent_inverse],
         "place": {name: _plain(getattr(face, name)) for name in _PLACE},
         "settings": _settings(face),
@@ -350,6 +351,7 @@ def _give_parent_back(face: bpy.types.Object, parent: bpy.types.Object | None, s
     now = face.matrix_world.copy()
     face.parent = parent
     face.parent_type, face.parent_bone = state["parent_type"], state["parent_bone"]
+    face.parent_vertices = state["parent_vertices"]
     face.matrix_parent_inverse = Matrix(state["parent_inverse"])
     for name, value in state["place"].items():
         setattr(face, name, value)

@@ -201,6 +201,41 @@ def test_slots_of_mesh_and_object_and_places_come_back(link):
     assert np.abs(np.array(place) - np.array(face.matrix_world)).max() < 1e-6
 
 
+@pytest.mark.parametrize("kind", ["none", "OBJECT", "VERTEX"])
+def test_an_animated_face_moves_as_before(kind):
+    """Under a parent or not, with a delta and curves on its own location: the rig stands between, and is not felt."""
+    bpy.ops.mesh.primitive_cube_add(location=(1.0, 2.0, 3.0), rotation=(0.1, 0.2, 0.3))
+    holder = bpy.context.object
+    face = make_face()
+    face.delta_location = (0.0, 0.5, 0.0)
+    if kind != "none":
+        face.parent, face.parent_type = holder, kind
+        face.parent_vertices = (3, 0, 0) if kind == "VERTEX" else (0, 0, 0)
+    for frame in (1, 11):
+        face.location = (0.1 * frame, 0.2, 0.3)
+        face.keyframe_insert("location", frame=frame)
+    scene = bpy.context.scene
+
+    def places():
+        found = []
+        for frame, where in ((1, 1.0), (6, 2.0), (11, 3.0)):
+            holder.location.x = where
+            scene.frame_set(frame)
+            bpy.context.view_layer.update()
+            found.append(np.array(face.matrix_world))
+        return np.array(found)
+
+    expected = places()
+    before = inventory()
+    bpy.ops.sanguine.apply_skin()
+    bpy.ops.sanguine.bake_blood()
+    bpy.context.view_layer.update()
+    assert places() == pytest.approx(expected, abs=1e-5)
+    bpy.ops.sanguine.remove_skin()
+    assert places() == pytest.approx(expected, abs=1e-6)
+    same(before)
+
+
 def test_what_was_moved_since_stays_there():
     face = make_face()
     bpy.ops.sanguine.apply_skin()

@@ -52,7 +52,7 @@ def _object(item):
     settings = getattr(item, "sanguine", None)
     return {
         "parent": item.parent and item.parent.name,
-        "parent_type": (item.parent_type, item.parent_bone),
+        "parent_type": (item.parent_type, item.parent_bone, tuple(item.parent_vertices)),
         "place": [tuple(row) for row in (*item.matrix_parent_inverse, *item.matrix_basis)],
         "modifiers": [(m.type, m.name) for m in item.modifiers],
         "groups": [group.name for group in item.vertex_groups],
