@@ -76,17 +76,15 @@ def _picture(
     if not meshes:
         return
     _set(armature, values)
-    graph = bpy.context.evaluated_depsgraph_get()
     corners = []
     for mesh in meshes:
-        keys = mesh.data.shape_keys.key_blocks
         position, rest = (np.empty((len(mesh.data.vertices), 3), dtype=np.float32) for _ in range(2))
         mesh.data.vertices.foreach_get("co", rest.ravel())
         position[:] = rest
         moved = np.empty_like(rest)
-        for key in mesh.evaluated_get(graph).data.shape_keys.key_blocks[1:]:
+        for key in mesh.data.shape_keys.key_blocks[1:]:  # driven values are written back to the keys
             if key.value and not key.mute:
-                keys[key.name].data.foreach_get("co", moved.ravel())
+                key.data.foreach_get("co", moved.ravel())
                 position += key.value * (moved - rest)
         mesh.data.calc_loop_triangles()
         triangle = np.empty(3 * len(mesh.data.loop_triangles), dtype=np.int32)

@@ -125,6 +125,7 @@ class Panel(Window):
             *((f"open {name}", lambda name=name: self.look(name)) for name in PANELS),
             ("an action unit", self.unit),
             ("a dialogue: Draw a Person", self.person),
+            ("Remove Sanguine", self.take_off),
         ]
 
     def anger(self) -> None:
@@ -154,7 +155,8 @@ class Panel(Window):
         self.s.check("done again", f'"surprise" in {BONE}')
 
     def remove(self) -> None:
-        self.click("Remove")
+        ui, above = self.s.region(), self.s.find("Blood pace", self.s.region())  # not the button Remove Sanguine
+        self.s.click(*self.s.find("Remove", Box(ui.x, above.y, ui.width - TAB_WIDTH, 80)).middle)
         self.s.type("surp")
         self.s.key("Return")
         self.s.check("surprise is off the rig", f'"surprise" not in {BONE}')
@@ -181,6 +183,14 @@ class Panel(Window):
         self.s.check("the skin is another", f"abs({FACE}.sanguine.melanin - {before}) > 1e-6")
         self.undo()
         self.s.check("and is back", f"abs({FACE}.sanguine.melanin - {before}) < 1e-6")
+
+
+    def take_off(self) -> None:
+        self.click("Remove Sanguine")
+        self.s.check("no sliders", f'"sanguine" not in {RIG}.pose.bones or not {BONE}.keys()')
+        self.s.shot("removed")
+        self.undo()
+        self.s.check("all is back", f'"anger" in {BONE} and "blood_hemoglobin_cheeks" in {FACE}')
 
 
 class Blood(Window):
