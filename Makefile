@@ -55,13 +55,15 @@ test: setup $(TEST_STAMP) ## Install what is needed and run every test
 soak: setup $(TEST_STAMP) ## Look for stacks and skins that break the optics, for an hour or so
 	$(PY) -m pytest tests/stability --soak
 
-bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (half an hour, on an idle machine)
+bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (three quarters of an hour, on an idle machine)
 	$(VENV)/bin/sanguine bench accuracy
 	$(PY) bench/measured_skin.py
 	$(PY) bench/inversion.py
 	$(PY) bench/measured_people.py
 	$(PY) bench/strain.py
 	$(PY) bench/blood_colour.py --extremes
+	$(PY) bench/emotion_in_time.py
+	$(PY) bench/scrubbing.py
 	$(PY) bench/feature_pictures.py --only times
 	$(PY) bench/picture.py
 
