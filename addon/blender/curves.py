@@ -52,10 +52,14 @@ def action_curve(owner: bpy.types.ID, data_path: str, index: int = -1, group: st
 
 
 def remove_curve(owner: bpy.types.ID, data_path: str, index: int = -1) -> bool:
-    """Removes the curve of `data_path`; whether there was one."""
+    """Removes the curve of `data_path`, and its channel group if nothing else is in it; whether there was one."""
     curve = find_curve(owner, data_path, index)
     if curve is not None:
-        _channels(owner).fcurves.remove(curve)
+        channels = _channels(owner)
+        group = None if hasattr(owner.animation_data.action, "slots") else curve.group  # with slots Blender does it itself
+        channels.fcurves.remove(curve)
+        if group is not None and not len(group.channels):
+            channels.groups.remove(group)
     return curve is not None
 
 

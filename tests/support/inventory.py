@@ -1,6 +1,7 @@
 """What is in a file, for comparisons of before and after: datablocks, properties, drivers, attributes, parents, values."""
 
 import bpy
+from sanguine.blender.curves import _channels, curves
 
 # Blender's own, or made by its window; "sanguine" and "cycles" are groups of registered properties, told by their values.
 _GROUPS = {"sanguine", "cycles", "cycles_curves", "cycles_visibility"}
@@ -34,6 +35,8 @@ def _id(item):
         "action": animation.action and animation.action.name,
         "drivers": sorted((c.data_path, c.array_index, c.driver.expression, c.mute) for c in animation.drivers),
         "tracks": len(animation.nla_tracks),
+        "curves": sorted((c.data_path, c.array_index, len(c.keyframe_points), c.group and c.group.name) for c in curves(item)),
+        "groups": sorted(group.name for group in channels.groups) if (channels := _channels(item)) else [],
     }
     more = {bpy.types.Object: _object, bpy.types.Mesh: _mesh, bpy.types.Key: _key, bpy.types.Armature: _armature}
     return known | next((tell(item) for kind, tell in more.items() if isinstance(item, kind)), {})
