@@ -16,7 +16,7 @@ from ..domain.people import SEXES, TONES, person
 from .albedo import picture_tasks
 from .controls import CONTROL_BONE
 from .material import MARK
-from .operators import active_face, albedo_of, live_plan, may_change, new_rig, put_controls
+from .operators import SHADING, active_face, albedo_of, live_plan, may_change, new_rig, put_controls, window_progress
 from .osl import missing_osl
 from .properties import growth_of, measure_maps, set_person, strength_property
 from .removal import Change, all_or_nothing, controls_of, has_skin, remove_skin
@@ -127,11 +127,7 @@ class SANGUINE_OT_adopt(bpy.types.Operator):
     shading: bpy.props.EnumProperty(
         name="Light in Picture",
         description="Light that is baked into the picture of the face's material",
-        items=[
-            ("auto", "Find Out", "Split off as much as pigment cannot explain"),
-            ("off", "None", "The picture is an albedo: all that is dark in it is pigment or blood"),
-            ("on", "Split Off", "The picture is a photograph: all slow changes of lightness are light"),
-        ],
+        items=SHADING,
     )
 
     @classmethod
@@ -149,21 +145,12 @@ class SANGUINE_OT_adopt(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """In one go, as scripts and the redo panel want it."""
         face = active_face(context)
-        window = context.window_manager
-        window.progress_begin(0, 1000)
-
-        def progress(done: int, total: int) -> bool:
-            window.progress_update(1000 * done // max(total, 1))
-            return True
-
         try:
-            with all_or_nothing(face, skin_slot(face)):
+            with window_progress(context) as progress, all_or_nothing(face, skin_slot(face)):
                 said = run_tasks(adopt_tasks(context, face, self.tone, self.shading), progress)
         except _EXPECTED as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        finally:
-            window.progress_end()
         return self._finish(said)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:

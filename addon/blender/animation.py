@@ -7,10 +7,10 @@ import bpy
 from ..domain.blood import STATES
 from ..domain.facs import EMOTION_CONTROLS, EMOTIONS
 from ..domain.profile import read_profile
-from .bake import RECORD, bake_blood, bake_state, clear_bake
-from .blood import blood_properties, drive_settled, remove_blood_drivers, set_profile
+from .bake import RECORD, bake_blood, clear_bake
+from .blood import blood_properties, redrive_blood, set_profile
 from .controls import CONTROL_BONE, OPTIONAL, add_controls, drive_shape_keys, remove_emotion
-from .operators import active_face, controls_of, emotion_bone, may_change
+from .operators import active_face, controls_of, emotion_bone, may_change, window_progress
 from .poses import add_poses
 
 
@@ -111,8 +111,7 @@ class SANGUINE_OT_remove_feeling(bpy.types.Operator):
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        remove_blood_drivers(face)
-        drive_settled(rig, face, blood_properties(face))
+        redrive_blood(rig, face)
         self.report({"INFO"}, f"{_LABELS[name][0]} is off the rig")
         return {"FINISHED"}
 
@@ -136,20 +135,12 @@ class SANGUINE_OT_bake_blood(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        window = context.window_manager
-        window.progress_begin(0, 1000)
-
-        def progress(done: int, total: int) -> bool:
-            window.progress_update(1000 * done // total)
-            return True
-
         try:
-            first, last = bake_blood(active_face(context), rig_of(context), context.scene, progress)
+            with window_progress(context) as progress:
+                first, last = bake_blood(active_face(context), rig_of(context), context.scene, progress)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        finally:
-            window.progress_end()
         self.report({"INFO"}, f"Blood baked from frame {first} to {last}")
         return {"FINISHED"}
 
@@ -203,8 +194,7 @@ class SANGUINE_OT_load_profile(bpy.types.Operator):
             return {"CANCELLED"}
         set_profile(rig, profile)
         if RECORD not in face:  # baked blood turns stale, and shows it
-            remove_blood_drivers(face)
-            drive_settled(rig, face, blood_properties(face))
+            redrive_blood(rig, face)
         told = f"{len(profile.rows)} measured changes of {profile.subjects} subjects" if profile else "The built-in table"
         self.report({"INFO"}, f"{told}. Apply the skin, so that its colours reach as far")
         return {"FINISHED"}

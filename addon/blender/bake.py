@@ -140,7 +140,8 @@ def fingerprint(armature: bpy.types.Object, scene: bpy.types.Scene) -> str:
     """Changes with whatever the bake depends on: curves, strips, drivers and values of the sliders, rate, model."""
     bone = armature.pose.bones[CONTROL_BONE]
     animation = armature.animation_data
-    animated = {curve.data_path for curve in _slider_curves(armature)}
+    animating = _slider_curves(armature)
+    animated = {curve.data_path for curve in animating}
     strips = _strips(animation)
     still = {name: float(bone[name]) for name in _sliders(armature) if not strips and _path(name) not in animated}
     what = [
@@ -148,7 +149,7 @@ def fingerprint(armature: bpy.types.Object, scene: bpy.types.Scene) -> str:
         armature.get(PROFILE, ""),
         scene.render.fps / scene.render.fps_base,
         still,
-        [_curve_print(curve) for curve in _slider_curves(armature)],
+        [_curve_print(curve) for curve in animating],
         [_properties(strip) for strip in strips],
         [_driver_print(curve) for curve in _drivers(armature)],
     ]

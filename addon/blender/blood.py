@@ -24,6 +24,7 @@ from ..domain.files import validate
 from ..domain.profile import Profile, with_profile
 from ..domain.response import MAX_EXPRESSION, Response, Sum, driver_text
 from .controls import CONTROL_BONE, describe, drive
+from .curves import drop_empty_animation
 
 
 # Partial sums of a channel, this many sliders each: 255 characters hold them with any values and short names.
@@ -121,9 +122,7 @@ def remove_blood(skin: bpy.types.Object) -> None:
     for name in _ours(skin):
         skin.driver_remove(f'["{name}"]')
         del skin[name]
-    animation = skin.animation_data
-    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
-        skin.animation_data_clear()
+    drop_empty_animation(skin)
 
 
 def mute_blood(skin: bpy.types.Object, mute: bool) -> None:
@@ -134,8 +133,8 @@ def mute_blood(skin: bpy.types.Object, mute: bool) -> None:
             curve.mute = mute
 
 
-def remove_blood_drivers(skin: bpy.types.Object) -> None:
-    """Leaves the properties that the material reads at 0, without drivers."""
+def redrive_blood(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
+    """Drives what the material reads as the rig's sliders and profile now want it; what they leave still is 0."""
     kept = blood_properties(skin)
     for name in _ours(skin):
         skin.driver_remove(f'["{name}"]')
@@ -143,3 +142,4 @@ def remove_blood_drivers(skin: bpy.types.Object) -> None:
             skin[name] = 0.0
         else:
             del skin[name]
+    drive_settled(armature, skin, kept)

@@ -43,7 +43,7 @@ from ..domain.facs import (
 from ..domain.naming import mesh_responses, recognise
 from ..domain.response import MAX_EXPRESSION, Formula, Sum, driver_text
 from ..domain.vascular import HEART_RATE, HEART_RATE_AT_REST
-from .curves import curves
+from .curves import curves, drop_empty_animation
 
 CONTROL_BONE = "sanguine"
 
@@ -351,9 +351,7 @@ def _drive_units(armature: bpy.types.Object, more: Iterable[str] = ()) -> None:
         existing = _driver(armature, path)
         if existing is None or existing.driver.expression != driver_text(formula)[0] or not _hears(existing, formula):
             drive(armature, path, formula, armature)
-    animation = armature.animation_data
-    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
-        armature.animation_data_clear()
+    drop_empty_animation(armature)
 
 
 def _hears(curve: bpy.types.FCurve, formula: Formula) -> bool:
@@ -448,7 +446,5 @@ def remove_drivers(owner: bpy.types.ID, armature: bpy.types.Object) -> list[str]
     paths = [curve.data_path for curve in curves if _listens_to(curve, armature)]
     for path in paths:
         owner.driver_remove(path)
-    animation = owner.animation_data
-    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
-        owner.animation_data_clear()
+    drop_empty_animation(owner)
     return paths

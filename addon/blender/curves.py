@@ -63,6 +63,13 @@ def remove_curve(owner: bpy.types.ID, data_path: str, index: int = -1) -> bool:
     return curve is not None
 
 
+def drop_empty_animation(owner: bpy.types.ID) -> None:
+    """Takes the owner's animation data away if nothing is left in it."""
+    animation = owner.animation_data
+    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
+        owner.animation_data_clear()
+
+
 def set_keys(
     curve: bpy.types.FCurve, frames: Sequence[float], values: Sequence[float], interpolation: str = "LINEAR"
 ) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import bpy
 from mathutils import Matrix
 
@@ -33,6 +36,22 @@ def active_face(context: bpy.types.Context) -> bpy.types.Object | None:
 def emotion_bone(face: bpy.types.Object) -> bpy.types.PoseBone | None:
     rig = controls_of(face)
     return rig.pose.bones.get(CONTROL_BONE) if rig is not None and rig.pose is not None else None
+
+
+@contextmanager
+def window_progress(context: bpy.types.Context) -> Iterator[Callable[[int, int], bool]]:
+    """What is done and to do, shown at the mouse; the callback never asks to stop."""
+    window = context.window_manager
+    window.progress_begin(0, 1000)
+
+    def progress(done: int, total: int) -> bool:
+        window.progress_update(1000 * done // max(total, 1))
+        return True
+
+    try:
+        yield progress
+    finally:
+        window.progress_end()
 
 
 def live_plan(face: bpy.types.Object) -> Plan:
@@ -128,6 +147,14 @@ def _image_behind(socket: bpy.types.NodeSocket, depth: int = 8) -> bpy.types.Ima
     return None
 
 
+SHADING = [
+    ("auto", "Find Out", "Split off as much as pigment cannot explain"),
+    ("off", "None", "The picture is an albedo: all that is dark in it is pigment or blood"),
+    ("on", "Split Off", "The picture is a photograph: all slow changes of lightness are light"),
+]
+"""What to do about light that is baked into a picture."""
+
+
 class SANGUINE_OT_read_picture(bpy.types.Operator):
     bl_idname = "sanguine.read_picture"
     bl_label = "Read Picture"
@@ -143,11 +170,7 @@ class SANGUINE_OT_read_picture(bpy.types.Operator):
     shading: bpy.props.EnumProperty(
         name="Light in it",
         description="Light that is baked into the picture",
-        items=[
-            ("auto", "Find Out", "Split off as much as pigment cannot explain"),
-            ("off", "None", "The picture is an albedo: all that is dark in it is pigment or blood"),
-            ("on", "Split Off", "The picture is a photograph: all slow changes of lightness are light"),
-        ],
+        items=SHADING,
     )
 
     @classmethod

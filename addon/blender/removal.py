@@ -21,7 +21,7 @@ from .bake import clear_bake
 from .blood import PROFILE, remove_blood
 from .controls import CONTROL_BONE, drive_shape_keys, remove_controls, remove_drivers, remove_head_drivers
 from .controls import remove_shape_key_drivers
-from .curves import curves, remove_curve
+from .curves import curves, drop_empty_animation, remove_curve
 from .material import MARK, remove_skin_material
 from .poses import CATALOG_TAG
 from .skin import our_slot
@@ -312,9 +312,7 @@ def _remove_controls(rig: bpy.types.Object) -> None:
     for name in (PROFILE, BEFORE):
         if name in rig:
             del rig[name]
-    animation = rig.animation_data
-    if animation and not (animation.drivers or animation.action or animation.nla_tracks):
-        rig.animation_data_clear()
+    drop_empty_animation(rig)
 
 
 def _remove_rig(rig: bpy.types.Object) -> None:

@@ -7,9 +7,10 @@ Results go to `--out` or, without it, to standard output; progress and messages 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from ..domain.errors import InputError
@@ -415,12 +416,8 @@ def _mesh_reader(options: argparse.Namespace) -> Any:
     """Reads a mesh file through Blender, which is loaded only when there is one to read."""
 
     def read(path: str) -> Any:
-        try:
+        with _needs_blender(f"{path}: mesh files need Blender"):
             from ..blender.meshes import read_mesh
-        except ModuleNotFoundError as error:
-            if error.name not in ("bpy", "_bpy"):
-                raise
-            raise InputError(f"{path}: mesh files need Blender: run this inside it, or `pip install bpy==4.5.15`") from None
         return read_mesh(path, options.object, options.unit)
 
     return read
@@ -485,12 +482,8 @@ def _render(options: argparse.Namespace) -> int:
                 from ..domain.errors import nearest
 
                 raise InputError(f"--only: no image '{name}' in {options.shot}, {nearest(name, known)}")
-    try:
+    with _needs_blender("render: no Blender module"):
         from ..blender.render import BlenderRenderer
-    except ModuleNotFoundError as error:
-        if error.name not in ("bpy", "_bpy"):
-            raise
-        raise InputError("render: no Blender module: run this inside Blender, or `pip install bpy==4.5.15`") from None
     with reporter(options.json_progress) as progress:
         render_batch(shot, options.shot, options.out, BlenderRenderer(), only=only, resume=options.resume,
                      progress=progress, quality=quality, keep_blend=options.blend)
@@ -530,13 +523,20 @@ def _scene_file(path: str, name: str = "") -> Any:
 
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file")
-    try:
+    with _needs_blender(f"{path}: needs Blender"):
         from ..blender.scene_file import SceneFile
+    return SceneFile(path, name)
+
+
+@contextlib.contextmanager
+def _needs_blender(what: str) -> Iterator[None]:
+    """Around an import of `blender`: where there is no bpy, one line that begins with `what`."""
+    try:
+        yield
     except ModuleNotFoundError as error:
         if error.name not in ("bpy", "_bpy"):
             raise
-        raise InputError(f"{path}: needs Blender: run this inside it, or `pip install bpy==4.5.15`") from None
-    return SceneFile(path, name)
+        raise InputError(f"{what}: run this inside Blender, or `pip install bpy==4.5.15`") from None
 
 
 def _number(text: str) -> float:

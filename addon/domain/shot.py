@@ -123,6 +123,14 @@ class Subject(_Table):
         return self.person.person.growth if self.person else Growth()
 
 
+# Table of a pose -> what it names, for people, and the names that there are.
+_NAMES = {
+    "emotions": ("emotion", EMOTIONS),
+    "action_units": ("action unit", UNIT_CONTROLS),
+    "states": ("state of the body", STATES),
+}
+
+
 class Pose(_Table):
     """Emotions, action units and states of the body, the strength of the blood's answer (above 1: exaggerated) and
     its pace (above 1: hurried), the heart."""
@@ -135,28 +143,13 @@ class Pose(_Table):
     pulse: Fraction = 0.0
     heart_rate: Annotated[float, pydantic.Field(ge=HEART_RATE[0], le=HEART_RATE[1])] = HEART_RATE_AT_REST
 
-    @pydantic.field_validator("emotions")
+    @pydantic.field_validator("emotions", "action_units", "states")
     @classmethod
-    def _emotions(cls, value: dict[str, float]) -> dict[str, float]:
+    def _known(cls, value: dict[str, float], info: pydantic.ValidationInfo) -> dict[str, float]:
+        kind, known = _NAMES[info.field_name]
         for name in value:
-            if name not in EMOTIONS:
-                raise ValueError(f"no such emotion '{name}', {nearest(name, EMOTIONS)}")
-        return value
-
-    @pydantic.field_validator("action_units")
-    @classmethod
-    def _units(cls, value: dict[str, float]) -> dict[str, float]:
-        for name in value:
-            if name not in UNIT_CONTROLS:
-                raise ValueError(f"no such action unit '{name}', {nearest(name, UNIT_CONTROLS)}")
-        return value
-
-    @pydantic.field_validator("states")
-    @classmethod
-    def _states(cls, value: dict[str, float]) -> dict[str, float]:
-        for name in value:
-            if name not in STATES:
-                raise ValueError(f"no such state of the body '{name}', {nearest(name, STATES)}")
+            if name not in known:
+                raise ValueError(f"no such {kind} '{name}', {nearest(name, known)}")
         return value
 
     @property
