@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import sanguine_core
 
-from ..domain.head import Head, MeshPart, build_head, load_presets, load_regions
+from ..domain.head import Head, HeadPackage, MeshPart, build_head, load_presets, load_regions
 from ..domain.head.surface import triangles
 from ..domain.resources import rigs_path
 from ..domain.strain import ShapeKeys
 from .maps import Surface
 
 
-def example_head(head_id: str) -> Head:
+def example_head(head_id: str, package: HeadPackage | None = None) -> Head:
     """A head of `rigs/heads.toml`. Raises HeadError when its package is not installed."""
     preset = load_presets(rigs_path("heads.toml"))[head_id]
-    return build_head(preset, load_regions(rigs_path("regions.toml")), _read_top_down)
+    return build_head(preset, load_regions(rigs_path("regions.toml")), _read_top_down, package)
 
 
 def head_surface(head: Head) -> Surface:

@@ -23,6 +23,7 @@ from .bake import bake_state
 from .blood import PROFILE
 from .capture import SANGUINE_OT_import_capture
 from .controls import CONTROL_BONE, OPTIONAL
+from .example import SANGUINE_OT_add_head
 from .material import MARK
 from .operators import (
     SANGUINE_OT_apply_skin,
@@ -50,6 +51,8 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         face = active_face(context)
+        if face is None:
+            layout.operator_menu_enum(SANGUINE_OT_add_head.bl_idname, "head", icon="ADD")
         if face is not None and not has_skin(face):
             layout.operator_context = "INVOKE_DEFAULT"
             layout.operator(SANGUINE_OT_adopt.bl_idname, icon="USER")

