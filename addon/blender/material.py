@@ -15,7 +15,7 @@ from ..domain.effects import EFFECTS, ShaderInput, grown, residual, skin_map, st
 from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
-from ..domain.shader import Shader, assemble, lobe_sockets, table_mixes, table_slices
+from ..domain.shader import TABLE_MIX, Shader, assemble, lobe_sockets, table_slices
 from .colour import working_space
 from .images import Pixels, data_image
 from .osl import script_node
@@ -233,7 +233,7 @@ class _Builder:
             for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix)):
                 shift = self.node("ShaderNodeVectorMath")
                 shift.operation = "ADD"
-                shift.inputs[1].default_value = (0.0, table.quantity_offset(quantity), 0.0)
+                shift.inputs[1].default_value = (table.quantity_offset(quantity), 0.0, 0.0)
                 self.link(points.outputs[coordinates], shift.inputs[0])
                 node = self.node("ShaderNodeTexImage")
                 node.image = image
@@ -242,8 +242,8 @@ class _Builder:
                 node.label = socket
                 self.link(shift.outputs["Vector"], node.inputs["Vector"])
                 self.link(node.outputs["Color"], lobes.inputs[socket])
-        for mix in table_mixes(table.axes):
-            self.link(points.outputs[mix], lobes.inputs[mix])
+        if TABLE_MIX in points.outputs:
+            self.link(points.outputs[TABLE_MIX], lobes.inputs[TABLE_MIX])
 
     def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
         """Columns from left to right, so that a person can read the group."""

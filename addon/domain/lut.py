@@ -1,8 +1,9 @@
 """The table of scattering: Burley lobes over the chromophores that vary, as one image.
 
-Layout, from the first row up: for each quantity (weight of each lobe, then d_mm of each) one block; a block holds one tile
-per entry of axis 2, one above the other; a tile has one row per entry of axis 1 and one column per entry of axis 0. Of
-axis 3, every entry has all of that for itself, side by side.
+A tile has one column per entry of the first axis and one row per entry of the second: an image's own linear filter does
+these two. Oxygenation, as the third, stands in levels one above the other, so close that the nearest one is read. Ink,
+whose steps are long, stands side by side, and two of its entries are mixed. All of that is one block; there is one for
+each quantity (weight of each lobe, then d_mm of each), side by side.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ LOBES = 4
 """The most that a profile is fitted with; `quality.Settings.lobes` may ask for fewer."""
 QUANTITIES = 2 * LOBES
 
+LEVEL_STEP = 0.01
+"""Distance of the levels of oxygenation at most: half of it is Delta E 0.13 in the bloodiest skin, 0.03 in most."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -37,24 +41,54 @@ class Table:
     fit_error: np.ndarray
 
     def quantity_offset(self, quantity: int) -> float:
-        """How far up the image (0-1) the block of `quantity` begins."""
+        """How far to the right (0-1) the block of `quantity` begins."""
         return quantity / (2 * self.lobes)
 
 
-def table_height(axes: tuple[Axis, ...], lobes: int = LOBES) -> int:
-    return 2 * lobes * math.prod(axis.count for axis in axes[1:3])
+@dataclass(frozen=True)
+class Layout:
+    """How the axes of a table stand in its image. columns, rows: of a tile; levels: how many tiles stand one above the
+    other; stacks: how many side by side in a block. level, mixed: the axis that is read so."""
+
+    columns: int
+    rows: int
+    level: Axis | None
+    mixed: Axis | None
+    lobes: int
+
+    @property
+    def levels(self) -> int:
+        if self.level is None:
+            return 1
+        return max(self.level.count, math.ceil((self.level.high - self.level.low) / LEVEL_STEP) + 1)
+
+    @property
+    def stacks(self) -> int:
+        return self.mixed.count if self.mixed else 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the image."""
+        return self.rows * self.levels, self.columns * self.stacks * 2 * self.lobes
 
 
-def table_width(axes: tuple[Axis, ...]) -> int:
-    return math.prod(axis.count for axis in (*axes[:1], *axes[3:]))
+def layout(axes: tuple[Axis, ...], lobes: int = LOBES) -> Layout:
+    counts = [axis.count for axis in axes[:2]] + [1, 1]
+    further = {axis.id: axis for axis in axes[2:]}
+    return Layout(counts[0], counts[1], further.get("oxygenation"), further.get("ink_per_mm"), lobes)
 
 
 def table_image(quantities: np.ndarray, axes: tuple[Axis, ...]) -> np.ndarray:
-    """(N, 2 * lobes, 3) of every entry, axis 0 fastest, laid out as (height, width, 3)."""
-    stacks = math.prod(axis.count for axis in axes[3:])
-    columns = axes[0].count if axes else 1
-    tiles = quantities.reshape(stacks, -1, columns, *quantities.shape[1:])  # (axis 3, axes 2 and 1, axis 0, quantity, 3)
-    return tiles.transpose(3, 1, 0, 2, 4).reshape(-1, stacks * columns, 3)
+    """(N, 2 * lobes, 3) of every entry, axis 0 fastest, laid out as (height, width, 3). Levels between entries are linear."""
+    form = layout(axes, quantities.shape[1] // 2)
+    solved = form.level.count if form.level else 1
+    entries = quantities.reshape(form.stacks, solved, form.rows, form.columns, *quantities.shape[1:])
+    at = np.linspace(0.0, solved - 1.0, form.levels)
+    first = np.minimum(at.astype(int), max(solved - 2, 0))
+    share = (at - first)[:, None, None, None, None]
+    levels = entries[:, first] * (1.0 - share) + entries[:, np.minimum(first + 1, solved - 1)] * share
+    # (stack, level, row, column, quantity, 3) -> (level, row, quantity, stack, column, 3)
+    return levels.transpose(1, 2, 4, 0, 3, 5).reshape(*form.shape, 3)
 
 
 def entry_skins(axes: tuple[Axis, ...], skin: Skin) -> np.ndarray:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .effects import Fragment, ShaderInput
-from .lut import LOBES, table_height, table_width
+from .lut import LOBES, layout
 from .plan import Axis, Plan
 from .resources import shaders_path
 
@@ -29,19 +29,28 @@ def assemble(plan: Plan) -> dict[str, Shader]:
     stages = {fragment.stage for fragment in plan.fragments}
     from_points = {item.key for f in plan.fragments for item in f.inputs if item.source == "chromophores"}
     axes = plan.axes
-    defines = {
-        "AXES": len(axes),
-        "TABLE_WIDTH": float(table_width(axes)),
-        "TABLE_HEIGHT": float(table_height(axes, plan.settings.lobes)),
+    form = layout(axes, plan.settings.lobes)
+    height, width = form.shape
+    defines: dict[str, object] = {
+        "AXES": min(len(axes), 2),
+        "TABLE_WIDTH": float(width),
+        "TABLE_HEIGHT": float(height),
+        "LEVELS": int(form.level is not None),
+        "SLICES": len(table_slices(axes)),
         "FILM": int("film" in from_points),
     }
-    for i, axis in enumerate(axes):
+    named = {f"AXIS_{i}": (axis, axis.count) for i, axis in enumerate(axes[:2])}
+    if form.level:
+        named["LEVEL"] = form.level, form.levels
+    if form.mixed:
+        named["MIXED"] = form.mixed, form.mixed.count
+    for name, (axis, count) in named.items():
         defines |= {
-            f"AXIS_{i}_VALUE": f"({axis.id} + {axis.offset})" if axis.offset else axis.id,
-            f"AXIS_{i}_LOW": axis.low + axis.offset,
-            f"AXIS_{i}_HIGH": axis.high + axis.offset,
-            f"AXIS_{i}_COUNT": float(axis.count),
-            f"AXIS_{i}_LOG": int(axis.logarithmic),
+            f"{name}_VALUE": f"({axis.id} + {axis.offset})" if axis.offset else axis.id,
+            f"{name}_LOW": axis.low + axis.offset,
+            f"{name}_HIGH": axis.high + axis.offset,
+            f"{name}_COUNT": float(count),
+            f"{name}_LOG": int(axis.logarithmic),
         }
     shaders = {
         "chromophores": _assemble("chromophores", plan.fragments, defines),
@@ -75,15 +84,13 @@ def _declare(item: ShaderInput) -> str:
 
 
 def table_slices(axes: tuple[Axis, ...]) -> dict[str, str]:
-    """The places of the table that are read, 1, 2 or 4 for axes up to 2, 3 or 4: suffix of the surface shader's lobe
-    inputs -> output of the chromophores shader that says where."""
-    slices = {"": "table_low", "_high": "table_high", "_next": "table_low_next", "_high_next": "table_high_next"}
-    return dict(list(slices.items())[: 1 << max(0, len(axes) - 2)])
+    """The places of the table that are read, two where an axis is mixed: suffix of the surface shader's lobe inputs ->
+    output of the chromophores shader that says where."""
+    return {"": "table_at", "_next": "table_next"} if layout(axes).mixed else {"": "table_at"}
 
 
-def table_mixes(axes: tuple[Axis, ...]) -> tuple[str, ...]:
-    """Sockets, of both shaders, that say how slices are mixed."""
-    return ("table_mix", "table_mix_next")[: max(0, len(axes) - 2)]
+TABLE_MIX = "table_mix"
+"""Socket, of both shaders, that says how two places are mixed."""
 
 
 def _lobe_inputs(plan: Plan) -> str:
@@ -92,7 +99,7 @@ def _lobe_inputs(plan: Plan) -> str:
         for suffix in table_slices(plan.axes)
         for k in range(plan.settings.lobes)
     ]
-    return "".join(lines) + "".join(f"    float {mix} = 0,\n" for mix in table_mixes(plan.axes))
+    return "".join(lines) + (f"    float {TABLE_MIX} = 0,\n" if layout(plan.axes).mixed else "")
 
 
 def lobe_sockets(lobes: int = LOBES, suffix: str = "") -> list[str]:

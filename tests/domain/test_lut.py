@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sanguine_core
 from sanguine.domain.effects import Frame, Scene
-from sanguine.domain.lut import LOBES, QUANTITIES, bake, entry_skins, table_height, table_width
+from sanguine.domain.lut import LEVEL_STEP, LOBES, QUANTITIES, bake, entry_skins, layout
 from sanguine.domain.parameters import PARAMETERS, default_skin, skin_rows
 from sanguine.domain.plan import Axis, check_strengths, make_plan, spaced
 
@@ -20,32 +20,60 @@ def lab(rgb):
     return colour.XYZ_to_Lab(colour.RGB_to_XYZ(np.maximum(rgb, 0.0), "sRGB"), white)
 
 
-def test_layout_is_axis_0_along_x_then_tiles_then_quantities():
+def test_layout_is_axis_0_along_x_then_levels_up_then_quantities_aside():
     axes = (HEMOGLOBIN, MELANIN, OXYGENATION)
     table = bake(axes, default_skin(), "rec709")
-    assert table.image.shape == (table_height(axes), HEMOGLOBIN.count, 3)
-    i, j, k, quantity = 3, 5, 2, 1
-    skin = default_skin() | {
-        axis.id: axis.values()[n] for axis, n in zip(axes, (i, j, k), strict=True)
-    }
-    fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=LOBES)
-    row = (quantity * OXYGENATION.count + k) * MELANIN.count + j
-    np.testing.assert_allclose(table.image[row, i], fit["weights"][0, quantity], rtol=1e-5)
-    row += LOBES * OXYGENATION.count * MELANIN.count
-    np.testing.assert_allclose(table.image[row, i], fit["d_mm"][0, quantity], rtol=1e-5)
+    form = layout(axes)
+    assert table.image.shape == (*form.shape, 3) == (form.levels * MELANIN.count, QUANTITIES * HEMOGLOBIN.count, 3)
+    i, j, quantity = 3, 5, 1
+    for k, level in ((0, 0), (OXYGENATION.count - 1, form.levels - 1)):
+        skin = default_skin() | {
+            axis.id: axis.values()[n] for axis, n in zip(axes, (i, j, k), strict=True)
+        }
+        fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=LOBES)
+        at = level * MELANIN.count + j, quantity * HEMOGLOBIN.count + i
+        np.testing.assert_allclose(table.image[at], fit["weights"][0, quantity], rtol=1e-5)
+        at = at[0], at[1] + LOBES * HEMOGLOBIN.count
+        np.testing.assert_allclose(table.image[at], fit["d_mm"][0, quantity], rtol=1e-5)
 
 
-def test_a_fourth_axis_stands_side_by_side():
+def test_levels_lie_on_the_line_between_entries():
+    axes = (HEMOGLOBIN, MELANIN, OXYGENATION)
+    form = layout(axes)
+    image = bake(axes, default_skin(), "rec709").image.reshape(form.levels, MELANIN.count, -1, 3)
+    assert (OXYGENATION.high - OXYGENATION.low) / (form.levels - 1) <= LEVEL_STEP
+    per_entry = (form.levels - 1) / (OXYGENATION.count - 1)
+    middle = np.interp(0.5 * per_entry, [0, per_entry], [0, 1])
+    inner = [k for k in range(form.levels) if k < per_entry]
+    first, last = image[0], bake((*axes[:2], Axis("oxygenation", *OXYGENATION.values()[:2], 2, False)), default_skin(), "rec709")
+    last = last.image.reshape(-1, MELANIN.count, first.shape[1], 3)[-1]
+    assert middle == 0.5
+    for k in inner:
+        np.testing.assert_allclose(image[k], first + (last - first) * k / per_entry, rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize("melanin", [0.002, 0.02, 0.1])
+@pytest.mark.parametrize("hemoglobin", [0.005, 0.05, 0.19])
+def test_half_a_level_of_oxygenation_is_invisible(melanin, hemoglobin):
+    """Delta E 2000 below 0.15 everywhere: a seventh of what an observer sees side by side."""
+    base = default_skin() | {"melanin": melanin, "hemoglobin": hemoglobin}
+    rows = skin_rows([base | {"oxygenation": o} for o in np.arange(0.0, 1.0 + 1e-9, 0.5 * LEVEL_STEP)])
+    seen = lab(sanguine_core.burley_lobes(rows, "rec709", lobe_count=LOBES)["rgb"])
+    assert colour.delta_E(seen[:-1], seen[1:], method="CIE 2000").max() < 0.15
+
+
+def test_ink_stands_side_by_side():
     axes = (Axis("hemoglobin", 0.002, 0.06, 4, True), Axis("melanin", 0.01, 0.06, 3, True),
             Axis("oxygenation", 0.5, 0.95, 2, False), INK)
     table = bake(axes, default_skin(), "rec709")
-    assert table.image.shape == (QUANTITIES * 2 * 3, 3 * 4, 3) == (table_height(axes), table_width(axes), 3)
+    form = layout(axes)
+    assert table.image.shape == (*form.shape, 3) == (form.levels * 3, QUANTITIES * 3 * 4, 3)
     at = (1, 2, 1, 2)
     skin = default_skin() | {axis.id: axis.values()[n] for axis, n in zip(axes, at, strict=True)}
     fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=LOBES)
     for quantity in range(LOBES):
-        row = (quantity * 2 + at[2]) * 3 + at[1]
-        np.testing.assert_allclose(table.image[row, at[3] * 4 + at[0]], fit["weights"][0, quantity], rtol=1e-5)
+        place = (form.levels - 1) * 3 + at[1], (quantity * 3 + at[3]) * 4 + at[0]
+        np.testing.assert_allclose(table.image[place], fit["weights"][0, quantity], rtol=1e-5)
 
 
 def test_values_run_from_end_to_end():
@@ -58,7 +86,7 @@ def test_values_run_from_end_to_end():
 
 def test_a_constant_skin_is_one_entry():
     table = bake((), default_skin(), "rec709")
-    assert table.image.shape == (QUANTITIES, 1, 3)
+    assert table.image.shape == (1, QUANTITIES, 3)
 
 
 def test_only_the_entries_of_the_plan_are_solved():

@@ -9,7 +9,7 @@ from sanguine.app.planning import plan_report
 from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.errors import InputError
-from sanguine.domain.lut import bake
+from sanguine.domain.lut import bake, layout
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import check_strengths, make_plan
 from sanguine.domain.quality import DEFAULT, POINTS, PRESET_NAMES, PRESETS, Settings, choice, read_points, within
@@ -104,7 +104,7 @@ def test_lobes_reach_table_and_shader():
         assert len(lobe_sockets(lobes)) == 2 * lobes
     plan = make_plan(scene(), settings(lobes=2, table_step=8.0))
     table = bake(plan.axes, plan.scene.skin, "rec709", lobes=2)
-    assert table.image.shape[0] == 4 * plan.entries // plan.axes[0].count
+    assert table.image.shape[:2] == layout(plan.axes, 2).shape
     assert table.quantity_offset(2) == 0.5  # two weights, then two radii
 
 
