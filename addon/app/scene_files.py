@@ -26,6 +26,9 @@ class Scene(Protocol):
     def frames(self) -> range:
         """What its scene renders."""
 
+    def prepare(self, progress: Callable[[int, int], bool] | None = None) -> list[str]:
+        """Brings what was made otherwise up to date: what was done, a line each."""
+
     def stale(self) -> dict[str, str]:
         """Face -> why its blood is not what the animation asks for; "" where it is."""
 
@@ -45,12 +48,15 @@ def bake_file(
     """Bakes the blood of a file and writes it to `target`; None: only says what is stale."""
     before = scene.stale()
     faces = {name: {"was": why or "fresh"} for name, why in before.items()}
+    notes = []
     if target is not None:
+        notes = scene.prepare(_told(progress, "solving skins"))
         for name, (first, last) in scene.bake(_told(progress)).items():
             faces[name] |= {"first": first, "last": last}
         with atomic(target) as file:
             scene.save(file)
-    return {"sanguine": sanguine_core.__version__, "faces": faces, "stale": sorted(name for name, why in before.items() if why)}
+    stale = sorted(name for name, why in before.items() if why)
+    return {"sanguine": sanguine_core.__version__, "faces": faces, "stale": stale, "notes": notes}
 
 
 def render_file(
@@ -60,16 +66,18 @@ def render_file(
     only: list[str] | None = None,
     resume: bool = False,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
-) -> None:
+) -> list[str]:
     """Renders the frames of a file into the folder `out`, after baking its blood anew, and writes the manifest.
 
-    only: names of images, the frames with six digits. Raises InputError for one that the scene does not render.
+    only: names of images, the frames with six digits. Returns what else was brought up to date before, a line each.
+    Raises InputError for an image that the scene does not render.
     """
     folder = Path(out)
     names = {f"{frame:06d}": frame for frame in scene.frames}
     for name in only or ():
         if name not in names:
             raise InputError(f"--only: no image '{name}' in {path}, {nearest(name, names)}")
+    notes = scene.prepare(_told(progress, "solving skins"))
     baked = scene.bake(_told(progress))
     wanted = [name for name in names if only is None or name in only]
     fingerprint = key_of(scene.version, sha256(Path(path)))
@@ -93,11 +101,12 @@ def render_file(
             }
             manifest.add({name + end: {"file": name + end, "sha256": sums[end], **row} for end in IMAGE_SUFFIXES})
     progress("rendered", len(wanted), len(wanted))
+    return notes
 
 
-def _told(progress: Callable[[str, int, int], None]) -> Callable[[int, int], bool]:
+def _told(progress: Callable[[str, int, int], None], what: str = "baking blood") -> Callable[[int, int], bool]:
     def tell(done: int, total: int) -> bool:
-        progress("baking blood", done, total)
+        progress(what, done, total)
         return True
 
     return tell

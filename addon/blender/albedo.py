@@ -9,7 +9,7 @@ import bpy
 from ..app.inverting import invert_tiles
 from ..app.tasks import Progress, Task, Tasks, run_tasks
 from ..domain.effects import residual, skin_map
-from .colour import working_space
+from .colour import READ_IN, as_json, working_space
 from .images import data_image, scene_linear, store_range
 from .properties import skin_of
 
@@ -44,6 +44,7 @@ def picture_tasks(face: bpy.types.Object, image: bpy.types.Image, shading: str =
     store_range(blood, made["ranges"])  # a picture says nothing of oil: the face's own slider stays
     over = data_image(f"{image.name} residual", made["residual"], half=True)
     blood[READ_FROM] = over[READ_FROM] = image.name
+    over[READ_IN] = as_json(space)
     face.sanguine.skin_map, face.sanguine.residual = blood, over
     for old in before:
         if old is not None and not old.users:

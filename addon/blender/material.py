@@ -16,7 +16,7 @@ from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shader import TABLE_MIX, Shader, assemble, lobe_sockets, table_slices
-from .colour import working_space
+from .colour import sign_table, working_space
 from .images import Pixels, data_image
 from .osl import script_node
 
@@ -229,6 +229,7 @@ class _Builder:
     def read_table(self, table: Table, points: bpy.types.Node, lobes: bpy.types.Node) -> None:
         """One Image Texture node per quantity (and slice), all on one packed image."""
         image = data_image(f"{self.name} table", table.image)
+        sign_table(image, table.axes, self.plan.skin, table.lobes)
         for suffix, coordinates in table_slices(table.axes).items():
             for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix)):
                 shift = self.node("ShaderNodeVectorMath")

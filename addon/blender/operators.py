@@ -16,12 +16,13 @@ from ..domain.plan import Plan, make_plan
 from .albedo import read_picture
 from ..domain.vascular import reach
 from .blood import blood_model, blood_sliders
+from .colour import follow_working_space, images_in, strange_images
 from .controls import CONTROL_BONE, DriveReport, add_controls, drive_shape_keys
 from .material import MARK
 from .osl import missing_osl
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
 from .removal import all_or_nothing, controls_of, mark_rig, nothing_left_behind, remember_keys
-from .skin import apply_skin, skin_slot
+from .skin import apply_skin, our_slot, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
 
 
@@ -273,4 +274,44 @@ def new_rig(context: bpy.types.Context, face: bpy.types.Object) -> bpy.types.Obj
     return rig
 
 
-CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, SANGUINE_OT_draw_person)
+def strange_colours(face: bpy.types.Object) -> list[bpy.types.Image]:
+    """Images of the face's skin that belong to another working space than the file has now."""
+    slot = our_slot(face)
+    return strange_images(images_in(face.material_slots[slot].material)) if slot is not None else []
+
+
+class SANGUINE_OT_follow_working_space(bpy.types.Operator):
+    bl_idname = "sanguine.follow_working_space"
+    bl_label = "Follow the Working Space"
+    bl_description = (
+        "The file's working space is another than the one that the skins were solved for: solve their tables again, so that "
+        "their colour stays what it was. Nothing else is touched"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        strange = strange_images()
+        if not strange:
+            cls.poll_message_set("Every skin was solved for the file's working space")
+        elif all(image.library for image in strange):
+            cls.poll_message_set("The skins are linked: open their own file and change its working space there")
+        else:
+            return True
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        own = [image for image in strange_images() if image.library is None]
+        try:
+            with window_progress(context) as progress, nothing_left_behind():
+                notes = follow_working_space(own, progress)
+        except (ValueError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"{len(own) - len(notes)} tables solved for the file's working space")
+        return {"FINISHED"}
+
+
+CLASSES = (SANGUINE_OT_apply_skin, SANGUINE_OT_read_picture, SANGUINE_OT_draw_person, SANGUINE_OT_follow_working_space)

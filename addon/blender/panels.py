@@ -28,10 +28,12 @@ from .material import MARK
 from .operators import (
     SANGUINE_OT_apply_skin,
     SANGUINE_OT_draw_person,
+    SANGUINE_OT_follow_working_space,
     SANGUINE_OT_read_picture,
     active_face,
     emotion_bone,
     live_plan,
+    strange_colours,
 )
 from .osl import missing_osl
 from .properties import strength_property
@@ -64,6 +66,9 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         elif face and context.scene.render.engine != "CYCLES" and any(m and MARK in m for m in face.data.materials):
             layout.label(text="Only Cycles shows the skin:", icon="INFO")
             layout.prop(context.scene.render, "engine", text="")
+        if face and strange_colours(face):
+            layout.label(text="Solved for another working space", icon="ERROR")
+            layout.operator(SANGUINE_OT_follow_working_space.bl_idname, icon="COLOR")
         bone = emotion_bone(face) if face else None
         if bone is None:
             return

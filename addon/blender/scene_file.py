@@ -10,6 +10,7 @@ import bpy
 from ..domain.errors import InputError, nearest
 from .bake import RECORD, bake_blood, bake_state
 from .blood import blood_properties
+from .colour import follow_working_space, strange_images
 from .operators import controls_of, emotion_bone
 from .osl import missing_osl
 from .render import quiet, save_render
@@ -45,6 +46,14 @@ class SceneFile:
     @property
     def frames(self) -> range:
         return range(self.scene.frame_start, self.scene.frame_end + 1, self.scene.frame_step)
+
+    def prepare(self, progress: Callable[[int, int], bool] | None = None) -> list[str]:
+        """Solves the tables that were made for another working space than the file's. Returns what was done, a line each."""
+        strange = strange_images()
+        notes = follow_working_space(strange, progress)
+        if len(strange) > len(notes):
+            notes.append(f"{len(strange) - len(notes)} skins solved for the file's working space, which has changed since")
+        return notes
 
     def stale(self) -> dict[str, str]:
         """Face -> why its blood is not what the animation asks for; "" where it is."""

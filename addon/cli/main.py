@@ -501,7 +501,9 @@ def _render_scene(options: argparse.Namespace, only: list[str] | None) -> int:
     check_folder(options.out)
     scene = _scene_file(options.shot)
     with reporter(options.json_progress) as progress:
-        render_file(scene, options.shot, options.out, only, options.resume, progress)
+        notes = render_file(scene, options.shot, options.out, only, options.resume, progress)
+    for note in notes:
+        print(f"sanguine: {options.shot}: {note}", file=sys.stderr)
     return 0
 
 
@@ -514,6 +516,8 @@ def _bake(options: argparse.Namespace) -> int:
     scene = _scene_file(options.scene, options.name)
     with reporter(options.json_progress) as progress:
         report = bake_file(scene, None if options.check else options.save or options.scene, progress)
+    for note in report["notes"]:
+        print(f"sanguine: {options.scene}: {note}", file=sys.stderr)
     _answer(report, options.out)
     return 1 if options.check and report["stale"] else 0
 

@@ -11,6 +11,7 @@ import sanguine_core
 import sanguine
 from sanguine.blender.curves import find_curve, set_keys
 from sanguine.blender.operators import emotion_bone
+from support.house_config import write_config
 from tests.blender.test_addon import grid
 
 
@@ -109,3 +110,15 @@ def test_what_is_wrong_is_one_line(scene, tmp_path, arguments, words):
     done = run(*(a.format(text=text, scene=scene, out=tmp_path / "out") for a in arguments))
     assert done.returncode == 2, done.stderr
     assert words in done.stderr and done.stderr.count("\n") == 1 and not done.stdout
+
+
+def test_another_working_space_is_followed(scene, tmp_path, monkeypatch):
+    monkeypatch.setenv("OCIO", str(write_config(tmp_path / "config.ocio", "ACEScg")))
+    done = run("render", scene, "--out", tmp_path / "out", "--only", "000001")
+    assert done.returncode == 0, done.stderr
+    assert "1 skins solved for the file's working space" in done.stderr
+    monkeypatch.delenv("OCIO")
+    done = run("render", scene, "--out", tmp_path / "own", "--only", "000001")
+    assert done.returncode == 0 and "working space" not in done.stderr
+    red, own = (sanguine_core.read_image(str(tmp_path / folder / "000001.exr")).mean((0, 1))[0] for folder in ("out", "own"))
+    assert red < 0.97 * own, "the red of light skin is less of ACEScg's red"
