@@ -11,7 +11,7 @@ import numpy as np
 import sanguine_core
 from mathutils import Color
 
-from ..domain.lut import bake
+from ..domain.lut import bake, layout
 from ..domain.plan import Axis
 from .images import data_image
 
@@ -87,6 +87,9 @@ def follow_working_space(
             continue
         request = json.loads(image[TABLE])
         axes = tuple(Axis(**row) for row in request["axes"])
+        if tuple(image.size) != layout(axes, request["lobes"]).shape[::-1]:
+            notes.append(f"{image.name}: laid out by another version of Sanguine: apply the skin again")
+            continue
         solved.append((image, axes, request, bake(axes, request["skin"], space, progress, request["lobes"])))
     for image, axes, request, table in solved:  # nothing is changed before all are solved
         name, linked = image.name, image.library is not None
