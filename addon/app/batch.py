@@ -128,7 +128,7 @@ def _parameters(shot: Shot, subject: Subject, job: Job, settings: Settings, maps
     return {
         "head": subject.rig.head,
         "skin": subject.whole_skin(),
-        "effects": subject.strengths(shot.effects),
+        "effects": {**subject.strengths(shot.effects), **dict.fromkeys(sorted(shot.switched_off), False)},
         "growth": asdict(subject.growth),
         "maps": maps,
         "pose": (pose := pose_of(shot, job)).model_dump(exclude={"id", "frame"}),

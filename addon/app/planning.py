@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any, Protocol
 
 import sanguine_core
 
-from ..domain.effects import EFFECTS, grown, wrinkles
+from ..domain.effects import EFFECTS
 from ..domain.framing import Framing, portrait
-from ..domain.lut import entry_skins
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice
 from ..domain.shot import Shot, Subject, scene_of
 from ..domain.texel_density import map_sizes, mm_per_uv
+from .costs import effect_costs, map_costs
 from .faces import example_head, head_surface
-from .maps import LARGEST_WRINKLES, Surface
+from .maps import Surface
 from .skin_maps import read_face_maps
-
-_TIMED_ENTRIES = 4
 
 
 class FaceOf(Protocol):
@@ -44,15 +41,14 @@ def plan_report(
     """The answer of `sanguine plan`: one plan per subject, the first one's at the top level too.
 
     `costs_ms` is what an effect adds to the preparation of this shot on this machine: the table entries that
-    would not be there without it, at the time a few entries took just now.
+    would not be there without it, at the time that an entry takes.
     """
     quality = quality or shot.chosen_quality
     plans = {
         subject.id: make_plan(scene_of(shot, subject, regions, read_face_maps(subject.maps).ranges), quality.settings)
         for subject in shot.subjects
     }
-    entry_ms = _entry_ms(next(iter(plans.values())))
-    reports = {name: _report(plan, entry_ms) for name, plan in plans.items()}
+    reports = {name: _report(plan) for name, plan in plans.items()}
     for subject in shot.subjects if face_of else ():
         reports[subject.id]["maps"] = _maps(plans[subject.id], shot, *face_of(subject))
     answer = {"sanguine": sanguine_core.__version__, "quality": _quality(shot, quality), **next(iter(reports.values()))}
@@ -68,18 +64,15 @@ def _maps(plan: Plan, shot: Shot, surface: Surface, framing: Framing) -> list[di
     sizes = map_sizes(span_mm, pixel_mm, plan.settings)
     seen = f"a pixel covers {pixel_mm:.2g} mm" if pixel_mm else "the camera is inside the face"
     rows = []
-    for name in [name for name in plan.maps if name not in plan.scene.maps]:
-        detail = grown.channels_of(name) is not None or name in wrinkles.IMAGES
-        size = sizes.detail if detail else sizes.smooth
-        if name in wrinkles.IMAGES:
-            size = min(size, LARGEST_WRINKLES)
+    for name, cost in map_costs(plan, sizes, len(surface.tiles)).items():
+        bound = "" if cost.detail else f"; at most {plan.settings.map_size} by quality"
         rows.append({
             "id": name,
-            "size": size,
-            "texel_mm": round(span_mm / size, 3),
+            "size": cost.size,
+            "texel_mm": round(span_mm / cost.size, 3),
             "tiles": list(surface.tiles),
-            "megabytes": round(len(surface.tiles) * size * size * 16 / 1e6, 1),  # four floats, as Blender holds them
-            "because": f"{seen}, a tile {span_mm:.0f} mm" + ("" if detail else f"; at most {plan.settings.map_size} by quality"),
+            "megabytes": round(cost.megabytes, 1),
+            "because": f"{seen}, a tile {span_mm:.0f} mm{bound}",
         })
     return rows
 
@@ -104,15 +97,8 @@ def _quality(shot: Shot, quality: Choice) -> dict[str, Any]:
     return report
 
 
-def _entry_ms(plan: Plan) -> float:
-    skins = entry_skins(plan.axes, plan.skin)[:_TIMED_ENTRIES]
-    start = time.perf_counter()
-    sanguine_core.burley_lobes(skins, "rec709", lobe_count=plan.settings.lobes)
-    return (time.perf_counter() - start) * 1000.0 / len(skins)
-
-
-def _report(plan: Plan, entry_ms: float) -> dict[str, Any]:
-    effects = []
+def _report(plan: Plan) -> dict[str, Any]:
+    effects, costs = [], effect_costs(plan, {})
     for effect in EFFECTS:
         decision = plan.decisions[effect.id]
         row: dict[str, Any] = {
@@ -123,8 +109,7 @@ def _report(plan: Plan, entry_ms: float) -> dict[str, Any]:
             "costs_ms": 0.0,
         }
         if decision.active:
-            entries = plan.entries - plan.without(effect.id).entries
-            row["costs_ms"] = round(entries * entry_ms, 3)
+            row["costs_ms"] = round(costs[effect.id].milliseconds, 3)
             row["maps"] = list(effect.maps(plan.scene))
         effects.append(row)
     return {

@@ -61,7 +61,9 @@ def build_skin_material(
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     output.location = (300, 0)
     tree.links.new(group.outputs["BSDF"], output.inputs["Surface"])
-    material[MARK] = {"effects": [effect.id for effect in plan.active], "entries": plan.entries}
+    material[MARK] = {
+        "effects": [effect.id for effect in plan.active], "entries": plan.entries, "fingerprint": plan.fingerprint,
+    }
     return material
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
-from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, scattering
+from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering
 from .errors import InputError, nearest
 from .parameters import PARAMETERS, Skin
 from .quality import DEFAULT, Settings, preset
@@ -66,13 +68,29 @@ class Plan:
 
     @property
     def active(self) -> tuple[Effect, ...]:
-        return tuple(e for e in EFFECTS if e.id in self.decisions and self.decisions[e.id].active)
+        return tuple(e for e in EFFECTS if self.decisions[e.id].active)
 
     def without(self, effect_id: str) -> Plan:
         """The plan as it would be if one effect did not exist, to price that effect."""
-        strengths = {name: value for name, value in self.scene.strengths.items() if name != effect_id}
-        scene = replace(self.scene, strengths=strengths)
-        return _decide(scene, self.settings, tuple(effect for effect in EFFECTS if effect.id != effect_id))
+        return make_plan(replace(self.scene, switched_off=self.scene.switched_off | {effect_id}), self.settings)
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes with whatever a material of this plan was made from; samples, which no material holds, apart. What the
+        painted features were found to reach follows from the rest."""
+        scene = self.scene
+        what = {
+            "skin": scene.skin,
+            "frames": [(f.id, f.emotions, f.blood, sorted((f.changes or {}).items()), f.moves) for f in scene.frames],
+            "strengths": {name: value for name, value in scene.strengths.items() if value},
+            "active": [effect.id for effect in self.active],
+            "regions": scene.regions,
+            "growth": asdict(scene.growth),
+            "maps": {name: held for name, held in scene.maps.items() if grown.channels_of(name) is None},
+            "given": (scene.live, scene.shape_keys, scene.pressure, scene.presses),
+            "quality": self.settings.model_dump(exclude={"samples"}),
+        }
+        return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:16]
 
     @property
     def entries(self) -> int:
@@ -82,12 +100,10 @@ class Plan:
 
 def make_plan(scene: Scene, settings: Settings | None = None) -> Plan:
     """Decides from the scene alone, at some quality (the default one if none is given); does none of the work."""
-    return _decide(scene, settings or preset(DEFAULT).settings, EFFECTS)
-
-
-def _decide(scene: Scene, settings: Settings, effects: tuple[Effect, ...]) -> Plan:
-    decisions = {effect.id: effect.activate(scene) for effect in effects}
-    active = [effect for effect in effects if decisions[effect.id].active]
+    settings = settings or preset(DEFAULT).settings
+    off = Activation(False, "switched off")
+    decisions = {effect.id: off if effect.id in scene.switched_off else effect.activate(scene) for effect in EFFECTS}
+    active = [effect for effect in EFFECTS if decisions[effect.id].active]
     axes, constants = _axes(scene, active, settings.table_step)
     fragments = [fragment for effect in active for fragment in effect.fragments(scene)]
     return Plan(
@@ -118,6 +134,15 @@ def check_strengths(given: Mapping[str, float], where: str, base: Mapping[str, f
             raise InputError(f"{where}: {key}: {value} is outside 0 to 1")
         strengths[key] = float(value)
     return strengths
+
+
+def check_switches(given: Mapping[str, bool], where: str) -> frozenset[str]:
+    """The effects that are off. Raises InputError for an unknown one, or one that cannot be off."""
+    switches = [effect.id for effect in EFFECTS if effect.switchable]
+    for key in given:
+        if key not in switches:
+            raise InputError(f"{where}: {key}: no effect that can be switched, {nearest(key, switches)}")
+    return frozenset(key for key, on in given.items() if not on)
 
 
 def _axes(scene: Scene, active: list[Effect], table_step: float) -> tuple[tuple[Axis, ...], dict[str, float]]:

@@ -53,6 +53,12 @@ class Point(Settings):
         """For panels and messages."""
         return f"Delta E {self.delta_e:.1f}, {self.seconds_per_megapixel:.3g} s per megapixel"
 
+    @property
+    def means(self) -> str:
+        """What it fixes, for panels and messages."""
+        lobes = f"{self.lobes} lobe{'' if self.lobes == 1 else 's'}"
+        return f"{self.samples} samples, {lobes}, maps of {self.map_size}"
+
 
 class Choice(NamedTuple):
     """Settings that somebody chose. point: what was measured of exactly these, if anything was."""
@@ -105,6 +111,17 @@ def within(delta_e: float) -> Point:
     best = min(POINTS, key=lambda point: point.delta_e)
     name = f" ('{best.preset}')" if best.preset else ""
     raise ValueError(f"no measured setting is within {delta_e:g}, the best{name} has {best.delta_e:g}")
+
+
+WITHIN = "within"
+"""What a panel calls "the cheapest within an error that somebody names", beside the presets."""
+
+BEST_DELTA_E = min(point.delta_e for point in POINTS)
+
+
+def chosen_point(quality: str, delta_e: float) -> Point:
+    """The point of a preset, or of WITHIN at `delta_e`, below the best measured one taken as that."""
+    return within(max(delta_e, BEST_DELTA_E)) if quality == WITHIN else preset(quality)
 
 
 def choice(quality: str | None, delta_e: float | None) -> Choice | None:

@@ -23,7 +23,7 @@ from .facs import EMOTIONS, UNIT_CONTROLS, VARIANTS
 from .files import read_toml, validate
 from .head import load_presets
 from .parameters import skin_from
-from .plan import check_strengths
+from .plan import check_strengths, check_switches, default_strengths
 from .profile import Profile, read_profile, with_profile
 from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
@@ -114,9 +114,11 @@ class Subject(_Table):
         """Every parameter: what `skin` names, else the person's, else the schema's default. Raises InputError."""
         return skin_from(self.skin, where, self.person.person.skin if self.person else None)
 
-    def strengths(self, effects: Mapping[str, float], where: str = "effects") -> dict[str, float]:
+    def strengths(self, effects: Mapping[str, bool | float], where: str = "effects") -> dict[str, float]:
         """Of every effect: what the shot's `effects` names, else the person's, else the default. Raises InputError."""
-        return check_strengths(effects, where, self.person.person.strengths if self.person else None)
+        known = default_strengths()
+        given = {name: float(value) for name, value in effects.items() if not isinstance(value, bool) or value and name in known}
+        return check_strengths(given, where, self.person.person.strengths if self.person else None)
 
     @property
     def growth(self) -> Growth:
@@ -222,7 +224,8 @@ class Shot(_Table):
     person: Individual | None = None
     skin: dict[str, float] = {}
     maps: Maps = Maps()
-    effects: dict[str, float] = {}
+    # Effect -> its strength, or false: switched off (true: as without this line, at full strength if it has one).
+    effects: dict[str, pydantic.StrictBool | float] = {}
     subject: list[Subject] = []
     expression: list[Expression] = []
     timeline: Timeline | None = None
@@ -238,6 +241,10 @@ class Shot(_Table):
     @classmethod
     def _known_quality(cls, value: str) -> str:
         return preset(value).preset
+
+    @property
+    def switched_off(self) -> frozenset[str]:
+        return frozenset(name for name, value in self.effects.items() if value is False)
 
     @property
     def chosen_quality(self) -> Choice:
@@ -294,7 +301,8 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
             seen.add(item.id)
     for subject in shot.subjects:
         subject.whole_skin(f"{path}: skin" if not shot.subject else f"{path}: subject {subject.id}: skin")
-    check_strengths(shot.effects, f"{path}: effects")
+    shot.subjects[0].strengths(shot.effects, f"{path}: effects")
+    check_switches({name: on for name, on in shot.effects.items() if isinstance(on, bool)}, f"{path}: effects")
     if shot.timeline and shot.timeline.last < shot.timeline.first:
         raise InputError(f"{path}: timeline.last: {shot.timeline.last} is before the first frame, {shot.timeline.first}")
     if (count := _count(shot)) > _MAX_IMAGES:
@@ -453,6 +461,7 @@ def scene_of(
         skin=subject.whole_skin(),
         frames=tuple(frames),
         strengths=subject.strengths(shot.effects),
+        switched_off=shot.switched_off,
         regions=regions,
         growth=subject.growth,
         maps=maps or {},

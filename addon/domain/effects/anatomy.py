@@ -56,4 +56,5 @@ EFFECT = Effect(
     bounds=_bounds,
     maps=lambda scene: (MAP,),
     default_strength=1.0,
+    group="structure",
 )

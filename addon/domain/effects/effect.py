@@ -63,6 +63,13 @@ class Scene:
     pressure: bool = False
     # Whether the rig has a slider by which the pressure comes and goes.
     presses: bool = False
+    # Effects that somebody has switched off, whatever calls for them: their strength is 0, their map is as if not there.
+    switched_off: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if off := self.switched_off:
+            object.__setattr__(self, "strengths", {k: 0.0 if k in off else v for k, v in self.strengths.items()})
+            object.__setattr__(self, "maps", {k: v for k, v in self.maps.items() if k not in off})
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,10 @@ class Effect:
     maps: Callable[[Scene], tuple[str, ...]] = _no_maps
     # An effect with a slider of its own has a default strength (0 = off unless asked for).
     default_strength: float | None = None
+    # Whether people may switch it off. What everything else stands on has no switch.
+    switchable: bool = True
+    # Where panels show its slider: a group of parameters (native/schema), or "features".
+    group: str = "features"
 
 
 def strength_activation(scene: Scene, effect_id: str, needs_regions: bool = False) -> Activation:

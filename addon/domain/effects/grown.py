@@ -65,7 +65,7 @@ def keyed(scene: Scene) -> dict[str, float]:
     found: dict[str, float] = {}
     for frame in scene.frames:
         for (feature, quantity), (_, high) in frame_changes(frame, scene.live).items():
-            if quantity == FEATURE:
+            if quantity == FEATURE and feature not in scene.switched_off:
                 found[feature] = max(found.get(feature, 0.0), min(high, _left(scene, feature)))
     return {feature: high for feature, high in found.items() if high > 0.0}
 

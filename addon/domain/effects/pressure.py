@@ -53,4 +53,5 @@ EFFECT = Effect(
     fragments=_fragments,
     bounds=_bounds,
     default_strength=1.0,
+    group="blood",
 )

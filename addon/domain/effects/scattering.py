@@ -18,4 +18,5 @@ EFFECT = Effect(
     writes=(),
     activate=_activate,
     fragments=lambda scene: (),  # it is the fixed code of both shaders
+    switchable=False,  # skin through which no light goes is black
 )

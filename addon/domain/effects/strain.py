@@ -86,4 +86,5 @@ EFFECT = Effect(
     bounds=_bounds,
     maps=lambda scene: IMAGES,
     default_strength=0.0,
+    group="blood",
 )
