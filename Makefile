@@ -10,6 +10,8 @@ MATRIX := 4.2.23 5.0.1 5.2.3
 
 # Where `make window` keeps the Debian 13 with Blender 4.3.2 in it.
 WINDOW_ROOT ?= .cache/window
+# And `make chroots` its bare Debians with `bpy`.
+CHROOTS ?= .cache/chroots
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -35,7 +37,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix window clean system
+.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix chroots window clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -88,6 +90,9 @@ matrix: extension $(TEST_STAMP) ## Run the Blender tests on the other Blender ve
 
 window: setup extension ## Click through the panel in a real Blender's window (root; WINDOW_ROOT is its Debian 13 folder)
 	tools/window/run.sh $(WINDOW_ROOT) out/window $(PARTS)
+
+chroots: setup extension ## Install the zip in bare Debians with three Blenders, cut off from the network (root; ROOMS="bookworm trixie window")
+	tools/chroots/run.sh $(CHROOTS) $(WINDOW_ROOT) $(ROOMS)
 
 clean: ## Remove what was built (environments and downloads stay)
 	rm -rf build dist out $(NATIVE_STAMP)

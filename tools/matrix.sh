@@ -8,6 +8,7 @@
 # folder (.cache/trixie) provides it, which needs root and debootstrap.
 set -eu
 cd "$(dirname "$0")/.."
+. tools/debian.sh
 
 # A Python 3.13 that runs: on the path, or among pyenv's, whose shim on the path
 # may answer without having one selected.
@@ -24,17 +25,10 @@ find_python_3_13() {
 # Prepare the Debian 13 folder and run the given command in it, in this directory.
 in_trixie() {
     root=.cache/trixie
-    if [ ! -e "$root/.complete" ]; then
-        command -v debootstrap >/dev/null || apt-get install --yes --no-install-recommends debootstrap
-        rm -rf "$root"
-        debootstrap --variant=minbase trixie "$root" "${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
-        cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/" # the machine's proxy, if it has one
-        # shellcheck disable=SC2046 # the names are separate words on purpose
-        chroot "$root" apt-get install --yes --no-install-recommends ca-certificates python3-venv \
-            $(sed -n "s/^blender='\(.*\)'/\1/p" tools/install_system_packages.sh)
-        touch "$root/.complete"
-    fi
+    # shellcheck disable=SC2046 # the names are separate words on purpose
+    debian_folder trixie "$root" matrix ca-certificates python3-venv $(blender_libraries)
     # A private mount namespace: nothing stays mounted, whatever happens.
+    # shellcheck disable=SC2016 # for the shell inside
     root=$(realpath "$root") here=$(pwd) unshare --mount sh -ec '
         mkdir -p "$root$here" "$root/etc/ssl/certs"
         mount -t proc proc "$root/proc"
@@ -87,6 +81,7 @@ for version in "$@"; do
         set -e
         run_version "$version"
     )
+    # shellcheck disable=SC2181 # a condition would switch `set -e` off
     [ $? -eq 0 ] || failed="$failed $version"
     set -e
 done

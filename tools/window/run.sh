@@ -7,22 +7,11 @@
 # Blender's log. Needs the zip in dist/ and .venv: `make window` sees to both.
 set -eu
 cd "$(dirname "$0")/../.."
+. tools/debian.sh
 root=$1 out=$2
 shift 2
 
-if [ ! -e "$root/.complete-window" ]; then
-    command -v debootstrap >/dev/null || apt-get install --yes --no-install-recommends debootstrap
-    [ -e "$root/bin/sh" ] || debootstrap --variant=minbase trixie "$root" "${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
-    cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/" # the machine's proxy, if it has one
-    # shellcheck disable=SC2016 # $PATH and $@ are for the shell inside
-    root=$(realpath "$root") unshare --mount sh -ec '
-        mount -t proc proc "$root/proc"
-        export DEBIAN_FRONTEND=noninteractive
-        chroot "$root" apt-get update
-        chroot "$root" apt-get install --yes --no-install-recommends \
-            blender python3-numpy xvfb libgl1-mesa-dri imagemagick xdotool tesseract-ocr tesseract-ocr-eng'
-    touch "$root/.complete-window"
-fi
+window_folder "$root"
 
 mkdir -p "$out"
 root=$(realpath "$root") out=$(realpath "$out")
@@ -34,6 +23,7 @@ cp dist/sanguine-*.zip tools/window/bridge.py tools/window/screen.py tools/windo
 
 # A private mount namespace: nothing stays mounted, whatever happens.
 set +e
+# shellcheck disable=SC2016 # for the shell inside
 root=$root unshare --mount sh -c '
     mount -t proc proc "$root/proc" && mount --bind /dev "$root/dev" &&
     exec chroot "$root" env --chdir=/tmp/sanguine PWD=/tmp/sanguine HOME=/tmp/sanguine/home LANG=C.UTF-8 python3 tour.py "$@"' sh "$@"
