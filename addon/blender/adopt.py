@@ -16,7 +16,7 @@ from ..domain.people import SEXES, TONES, person
 from .albedo import picture_tasks
 from .controls import CONTROL_BONE
 from .material import MARK
-from .operators import SHADING, active_face, albedo_of, live_plan, may_change, new_rig, put_controls, window_progress
+from .operators import SHADING, active_face, albedo_of, live_plan, may_change, new_rig, put_controls, tell_up_to_date, window_progress
 from .osl import missing_osl
 from .properties import growth_of, measure_maps, set_person, strength_property
 from .removal import Change, all_or_nothing, controls_of, has_skin, remove_skin
@@ -225,6 +225,7 @@ class SANGUINE_OT_remove_skin(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face, active = skinned_face(context), context.view_layer.objects.active
+        tell_up_to_date(self, face)
         rig = controls_of(face)
         on_rig = active is not None and active == rig
         try:

@@ -19,6 +19,7 @@ from .blood import blood_model, blood_sliders
 from .colour import follow_working_space, images_in, strange_images
 from .controls import CONTROL_BONE, DriveReport, add_controls, drive_shape_keys
 from .material import MARK
+from .migration import bring_up_to_date, newer
 from .osl import missing_osl
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
 from .removal import all_or_nothing, controls_of, mark_rig, nothing_left_behind, remember_keys
@@ -81,9 +82,17 @@ def may_change(cls: type[bpy.types.Operator], face: bpy.types.Object | None) -> 
         cls.poll_message_set("Select a face: a mesh object")
     elif face.library or face.data.library:
         cls.poll_message_set("The face is linked: make it local, or override its library, first")
+    elif why := newer(face):
+        cls.poll_message_set(why)
     else:
         return True
     return False
+
+
+def tell_up_to_date(operator: bpy.types.Operator, face: bpy.types.Object) -> None:
+    """Brings a face from an older version up to date, and says so."""
+    for line in bring_up_to_date(face):
+        operator.report({"INFO"}, line)
 
 
 class SANGUINE_OT_apply_skin(bpy.types.Operator):
@@ -104,6 +113,7 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
+        tell_up_to_date(self, face)
         context.view_layer.update()  # scales that a script has just set count too
         slot = skin_slot(face)
         try:
@@ -190,6 +200,7 @@ class SANGUINE_OT_read_picture(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
+        tell_up_to_date(self, face)
         image = bpy.data.images.get(self.image) if self.image else albedo_of(face)
         if image is None:
             self.report({"ERROR"}, f"no picture '{self.image}'" if self.image else "the face's material has no picture: name one")
@@ -232,6 +243,7 @@ class SANGUINE_OT_draw_person(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)
+        tell_up_to_date(self, face)
         growth = growth_of(face)
         drawn = person(self.tone, self.sex, growth.age_years, growth.seed, growth.sun)
         set_person(face, drawn)

@@ -25,6 +25,7 @@ from .capture import SANGUINE_OT_import_capture
 from .controls import CONTROL_BONE, OPTIONAL
 from .example import SANGUINE_OT_add_head
 from .material import MARK
+from .migration import newer
 from .operators import (
     SANGUINE_OT_apply_skin,
     SANGUINE_OT_draw_person,
@@ -66,6 +67,9 @@ class SANGUINE_PT_main(_SidebarPanel, bpy.types.Panel):
         elif face and context.scene.render.engine != "CYCLES" and any(m and MARK in m for m in face.data.materials):
             layout.label(text="Only Cycles shows the skin:", icon="INFO")
             layout.prop(context.scene.render, "engine", text="")
+        if face and (why := newer(face)):
+            layout.label(text=why, icon="ERROR")
+            return
         if face and strange_colours(face):
             layout.label(text="Solved for another working space", icon="ERROR")
             layout.operator(SANGUINE_OT_follow_working_space.bl_idname, icon="COLOR")

@@ -24,7 +24,7 @@ from .controls import remove_shape_key_drivers
 from .curves import curves, drop_empty_animation, remove_curve
 from .material import MARK, remove_skin_material
 from .poses import CATALOG_TAG
-from .skin import our_slot
+from .skin import VERSION, our_slot
 from .strain import remove_components
 from .surface import GROUP_PREFIX, REST_ATTRIBUTE
 
@@ -164,6 +164,8 @@ def remove_skin(face: bpy.types.Object) -> list[str]:
     clear_bake(face)
     remove_components(face)
     remove_blood(face)
+    if VERSION in face:
+        del face[VERSION]
     if not known:
         notes.append("the material that the face had is not known")
     _give_material_back(face, state)

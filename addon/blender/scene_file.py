@@ -11,6 +11,7 @@ from ..domain.errors import InputError, nearest
 from .bake import RECORD, bake_blood, bake_state
 from .blood import blood_properties
 from .colour import follow_working_space, strange_images
+from .migration import newer
 from .operators import controls_of, emotion_bone
 from .osl import missing_osl
 from .render import quiet, save_render
@@ -88,6 +89,8 @@ class SceneFile:
                 continue
             if face.library is not None:
                 raise InputError(f"{self.path}: {face.name}: linked without an override, so its blood cannot be baked")
+            if why := newer(face):
+                raise InputError(f"{self.path}: {why}")
             if emotion_bone(face) is None:
                 raise InputError(f"{self.path}: {face.name}: the rig that moves its blood is gone: parent it to its rig again")
             faces.append((face, controls_of(face)))

@@ -12,6 +12,7 @@ from ..app.tasks import Progress, Task, Tasks, run_tasks
 from ..domain.effects import strain, wrinkles
 from ..domain.errors import InputError
 from ..domain.lut import bake
+from ..domain.migration import SCHEMA, check_version
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
@@ -23,6 +24,9 @@ from .osl import missing_osl
 from .properties import images_of
 from .strain import drive_components, remove_components
 from .surface import pixel_mm, read_surface, store_rest
+
+VERSION = "sanguine_version"
+"""Custom property of a face with a skin: the version of what the add-on wrote onto it (domain/migration.py)."""
 
 
 def apply_skin(
@@ -53,6 +57,8 @@ def skin_tasks(
     """
     if why := missing_osl():
         raise InputError(f"{face.name}: {why}")
+    if VERSION in face:
+        check_version(face[VERSION], face.name)
     surface = read_surface(face) if plan.maps else None
     maps: dict[str, Map] = {}
     if surface:
@@ -93,6 +99,7 @@ def skin_tasks(
     if before is not None and MARK in before and not before.users:
         remove_skin_material(before)
         number_free(material)
+    face[VERSION] = SCHEMA
     return material
 
 
