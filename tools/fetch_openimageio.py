@@ -1,15 +1,20 @@
 #!/usr/bin/env python3
-"""Lay out the OpenImageIO that Sanguine links to: include/, lib/, fonts/, licenses/.
+"""Lay out the OpenImageIO that Sanguine links to: include/, lib/, fonts/, licenses/, on Windows bin/ too.
 
 The official wheel carries the shared libraries, needs only libc, libstdc++ and
-zlib, and exports their C++ symbols; the headers are in the source archive of
+zlib (on Linux), and exports their C++ symbols; the headers are in the source archive of
 the same version. Debian's own package would drag some 260 libraries into the
 extension. pip checks both files against the hashes in
 requirements-openimageio.txt.
 
+macOS and Windows are written and UNTESTED (docs/releasing.md). The wheel for
+Windows has DLLs without the import libraries of the two that we link to: they
+are made of the DLLs' tables of exports (pefile reads them, llvm-lib writes).
+
 Usage: fetch_openimageio.py DESTINATION
 """
 
+import platform
 import re
 import shutil
 import subprocess
@@ -24,6 +29,15 @@ REQUIREMENT = Path(__file__).with_name("requirements-openimageio.txt")
 # Names the people on a contact sheet.
 CAPTION_FONT = "DroidSans.ttf"
 
+# (sys.platform, machine) -> pip's name of the platform.
+WHEELS = {
+    ("linux", "x86_64"): "manylinux_2_28_x86_64",
+    ("darwin", "arm64"): "macosx_11_0_arm64",
+    ("darwin", "x86_64"): "macosx_10_15_x86_64",
+    ("win32", "AMD64"): "win_amd64",
+}
+LINKED = ("OpenImageIO", "OpenImageIO_Util")
+
 # Headers that OpenImageIO's build would have made: it forwards to the system's
 # fmt in the same way when that is not copied in.
 FMT_HEADERS = ("args.h", "format.h", "ostream.h", "printf.h")
@@ -34,7 +48,7 @@ def download(kind: str, target: Path) -> Path:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--no-build-isolation"]
     command += [kind, ":all:", "--require-hashes", "--requirement", str(REQUIREMENT), "--dest", str(target)]
     if kind == "--only-binary":  # the libraries do not depend on Python: one wheel serves every version
-        command += ["--python-version", "3.11", "--implementation", "cp", "--platform", "manylinux_2_28_x86_64"]
+        command += ["--python-version", "3.11", "--implementation", "cp", "--platform", WHEELS[sys.platform, platform.machine()]]
     subprocess.run(command, check=True)
     (result,) = target.glob("*.whl" if kind == "--only-binary" else "*.tar.gz")
     return result
@@ -62,8 +76,10 @@ def version_header(template: str, version: str) -> str:
 
 def destination_folder(member: Path) -> str | None:
     """Where a file of the wheel goes; None for those that are not needed."""
-    if ".so." in member.name:
+    if ".so." in member.name or member.suffix == ".dylib":
         return "lib"
+    if member.suffix == ".dll":
+        return "bin"
     if member.name == CAPTION_FONT:
         return "fonts"
     if member.parent.name == "licenses":
@@ -97,6 +113,21 @@ def lay_out(wheel: Path, sdist: Path, root: Path) -> None:
         (headers / "detail" / "fmt" / name).write_text(f"#include <fmt/{name}>\n")
 
 
+def make_import_libraries(root: Path) -> None:
+    """lib/NAME.lib for bin/NAME.dll, for each NAME that we link to."""
+    import pefile
+
+    (root / "lib").mkdir(exist_ok=True)
+    for name in LINKED:
+        library = pefile.PE(str(root / f"bin/{name}.dll"), fast_load=True)
+        library.parse_data_directories([pefile.DIRECTORY_ENTRY["IMAGE_DIRECTORY_ENTRY_EXPORT"]])
+        symbols = [symbol.name.decode() for symbol in library.DIRECTORY_ENTRY_EXPORT.symbols if symbol.name]
+        listed = root / f"lib/{name}.def"
+        listed.write_text("\n".join([f"LIBRARY {name}.dll", "EXPORTS", *(f"    {symbol}" for symbol in symbols), ""]))
+        command = ["llvm-lib", f"/def:{listed}", "/machine:x64", f"/out:{root / f'lib/{name}.lib'}"]
+        subprocess.run(command, check=True)
+
+
 def main() -> None:
     if len(sys.argv) != 2:
         sys.exit(__doc__)
@@ -111,6 +142,8 @@ def main() -> None:
             download("--no-binary", Path(scratch) / "sdist"),
             root,
         )
+        if sys.platform == "win32":
+            make_import_libraries(root)
         shutil.rmtree(destination, ignore_errors=True)
         root.rename(destination)
     print(f"OpenImageIO is in {destination}")

@@ -1,7 +1,11 @@
 // A file that appears whole or not at all.
 #pragma once
 
+#ifdef _WIN32
+#include <process.h>
+#else
 #include <unistd.h>
+#endif
 
 #include <atomic>
 #include <filesystem>
@@ -10,6 +14,10 @@
 #include "sanguine/image.hpp"
 
 namespace sanguine {
+
+#ifdef _WIN32
+inline int getpid() { return _getpid(); }
+#endif
 
 /// Write to temporary(), then commit(). Without a commit nothing is left behind.
 class AtomicFile {
