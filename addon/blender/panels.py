@@ -160,7 +160,7 @@ class SANGUINE_PT_main(_Part):
             layout.label(text="Only Cycles shows the skin:", icon="INFO")
             layout.prop(context.scene.render, "engine", text="")
         if face and (why := newer(face)):
-            layout.label(text=why, icon="ERROR")
+            _wrapped(layout, context, why, "ERROR")
             return
         if face and strange_colours(face):
             layout.label(text="Solved for another working space", icon="ERROR")
