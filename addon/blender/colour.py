@@ -11,7 +11,7 @@ import numpy as np
 import sanguine_core
 from mathutils import Color
 
-from ..domain.lut import bake, layout
+from ..domain.lut import Table, bake, layout
 from ..domain.plan import Axis
 from .images import data_image
 
@@ -49,9 +49,10 @@ def _is_here(kept: str | list[list[float]]) -> bool:
     return np.abs(_matrix(kept if isinstance(kept, str) else np.array(kept)) - _matrix(working_space())).max() < _SAME
 
 
-def sign_table(image: bpy.types.Image, axes: tuple[Axis, ...], skin: Mapping[str, float], lobes: int) -> None:
+def sign_table(image: bpy.types.Image, table: Table, skin: Mapping[str, float]) -> None:
     """Keeps with the image of a table what it takes to solve it again."""
-    request = {"axes": [asdict(axis) for axis in axes], "skin": dict(skin), "lobes": lobes, "space": json.loads(as_json(working_space()))}
+    request = {"axes": [asdict(axis) for axis in table.axes], "skin": dict(skin), "lobes": table.lobes, "walk": table.walk}
+    request["space"] = json.loads(as_json(working_space()))
     image[TABLE] = json.dumps(request)
 
 
@@ -87,14 +88,15 @@ def follow_working_space(
             continue
         request = json.loads(image[TABLE])
         axes = tuple(Axis(**row) for row in request["axes"])
-        if tuple(image.size) != layout(axes, request["lobes"]).shape[::-1]:
+        if tuple(image.size) != layout(axes, request["lobes"], request.get("walk", False)).shape[::-1]:
             notes.append(f"{image.name}: laid out by another version of Sanguine: apply the skin again")
             continue
-        solved.append((image, axes, request, bake(axes, request["skin"], space, progress, request["lobes"])))
-    for image, axes, request, table in solved:  # nothing is changed before all are solved
+        table = bake(axes, request["skin"], space, progress, request["lobes"], request.get("walk", False))
+        solved.append((image, request["skin"], table))
+    for image, skin, table in solved:  # nothing is changed before all are solved
         name, linked = image.name, image.library is not None
         new = data_image(name, table.image)
-        sign_table(new, axes, request["skin"], request["lobes"])
+        sign_table(new, table, skin)
         image.user_remap(new)
         if not linked:
             bpy.data.images.remove(image)

@@ -48,7 +48,7 @@ def build_skin_material(
 ) -> bpy.types.Material:
     """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`. table: solved here if left out."""
     if table is None:
-        table = bake(plan.axes, plan.skin, working_space(), lobes=plan.settings.lobes)
+        table = bake(plan.axes, plan.skin, working_space(), lobes=plan.settings.lobes, walk=plan.walk)
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # since Blender 5.0 there always is one
         material.use_nodes = True
@@ -114,7 +114,7 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map]) -> bpy.
     if table.axes:
         build.read_table(table, points, lobes)
     else:
-        for socket, value in zip(lobe_sockets(table.lobes), table.image.reshape(-1, 3), strict=True):
+        for socket, value in zip(lobe_sockets(table.lobes, walk=table.walk), table.image.reshape(-1, 3), strict=True):
             lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
     if "relief" in shaders:
         bump = build.node("ShaderNodeBump")
@@ -231,9 +231,9 @@ class _Builder:
     def read_table(self, table: Table, points: bpy.types.Node, lobes: bpy.types.Node) -> None:
         """One Image Texture node per quantity (and slice), all on one packed image."""
         image = data_image(f"{self.name} table", table.image)
-        sign_table(image, table.axes, self.plan.skin, table.lobes)
+        sign_table(image, table, self.plan.skin)
         for suffix, coordinates in table_slices(table.axes).items():
-            for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix)):
+            for quantity, socket in enumerate(lobe_sockets(table.lobes, suffix, table.walk)):
                 shift = self.node("ShaderNodeVectorMath")
                 shift.operation = "ADD"
                 shift.inputs[1].default_value = (table.quantity_offset(quantity), 0.0, 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..app.maps import Surface, bake_maps, reached, strain_coefficients, wrinkle_coefficients
 from ..app.tasks import Progress, Task, Tasks, run_tasks
-from ..domain.effects import strain, wrinkles
+from ..domain.effects import strain, thin, wrinkles
 from ..domain.errors import InputError
 from ..domain.lut import bake
 from ..domain.migration import SCHEMA, check_version
@@ -24,6 +24,7 @@ from .osl import missing_osl
 from .properties import images_of
 from .strain import drive_components, remove_components
 from .surface import pixel_mm, read_surface, store_rest
+from .thin import store_thin
 
 VERSION = "sanguine_version"
 """Custom property of a face with a skin: the version of what the add-on wrote onto it (domain/migration.py)."""
@@ -66,7 +67,7 @@ def skin_tasks(
         tiles = yield Task("Painting maps", lambda progress: bake_maps(plan, surface, sizes, progress=progress))
         maps = _maps(face, surface, plan, tiles, images_of(face) if given is None else given)
     plan, space = reached(plan, maps), working_space()
-    table = yield Task("Solving skin", lambda progress: bake(plan.axes, plan.skin, space, progress, plan.settings.lobes))
+    table = yield Task("Solving skin", lambda progress: bake(plan.axes, plan.skin, space, progress, plan.settings.lobes, plan.walk))
     components = []
     for images, solve, one_sided in (
         (strain.IMAGES, strain_coefficients, False),
@@ -80,6 +81,8 @@ def skin_tasks(
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
     if "rest_mm" in inputs:
         store_rest(face)
+    if thin.ATTRIBUTE in inputs:
+        store_thin(face)
     if face.material_slots:
         face.material_slots[slot].material = material  # the slot knows whether it belongs to the object or the mesh
     else:

@@ -28,14 +28,17 @@ REST_ATTRIBUTE = "rest_mm"
 def store_regions(obj: bpy.types.Object, regions: Mapping[str, np.ndarray]) -> None:
     """Masks (V,) 0-1 as vertex groups `sanguine_<region>`. A group that is there is kept: it may be painted."""
     for region, mask in regions.items():
-        name = GROUP_PREFIX + region
-        if name in obj.vertex_groups:
-            continue
-        group = obj.vertex_groups.new(name=name)
-        # One call per weight is slow for Blender's API, so weights go in 1/255 steps, finer than a painted mask.
-        levels = np.round(np.asarray(mask) * 255.0).astype(np.int32)
-        for level in np.unique(levels[levels > 0]):
-            group.add(np.nonzero(levels == level)[0].tolist(), float(level) / 255.0, "REPLACE")
+        if GROUP_PREFIX + region not in obj.vertex_groups:
+            store_weights(obj, GROUP_PREFIX + region, mask)
+
+
+def store_weights(obj: bpy.types.Object, name: str, weights: np.ndarray) -> None:
+    """A new vertex group of weights (V,) 0-1."""
+    group = obj.vertex_groups.new(name=name)
+    # One call per weight is slow for Blender's API, so weights go in 1/255 steps, finer than a painted mask.
+    levels = np.round(np.asarray(weights) * 255.0).astype(np.int32)
+    for level in np.unique(levels[levels > 0]):
+        group.add(np.nonzero(levels == level)[0].tolist(), float(level) / 255.0, "REPLACE")
 
 
 def face_regions(obj: bpy.types.Object) -> tuple[str, ...]:
@@ -57,12 +60,12 @@ def size_of_head(obj: bpy.types.Object) -> HeadSize:
     moves = _arkit_moves(obj)
     landmarks = _found(obj, moves).landmarks
     jaw = np.linalg.norm(moves["jawOpen"], axis=1) if "jawOpen" in moves else None
-    return head_size(_position_mm(obj), {name: 1000.0 * place for name, place in landmarks.items()}, jaw)
+    return head_size(position_mm(obj), {name: 1000.0 * place for name, place in landmarks.items()}, jaw)
 
 
 def _arkit_moves(obj: bpy.types.Object) -> dict[str, np.ndarray]:
     """ARKit key -> (V, 3) displacement at value 1, in metres, of the keys that the mesh has under any name."""
-    to_metres = _position_scale_mm(obj) / 1000.0
+    to_metres = position_scale_mm(obj) / 1000.0
     moves: dict[str, np.ndarray] = {}
     blocks = obj.data.shape_keys.key_blocks if obj.data.shape_keys else {}
     for name, arkit in recognise(blocks.keys()).strongest().items():
@@ -72,13 +75,18 @@ def _arkit_moves(obj: bpy.types.Object) -> dict[str, np.ndarray]:
 
 
 def _found(obj: bpy.types.Object, moves: Mapping[str, np.ndarray]) -> FoundRegions:
-    mesh = obj.data
-    mesh.calc_loop_triangles()
-    triangles = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
+    triangles = triangles_of(obj)
     indices = {name: np.flatnonzero(moved.any(axis=1)) for name, moved in moves.items()}
     keys = {name: ShapeKey(index, moves[name][index]) for name, index in indices.items()}
-    return find_regions(_position_mm(obj) / 1000.0, triangles.reshape(-1, 3), keys, load_regions(rigs_path("regions.toml")))
+    return find_regions(position_mm(obj) / 1000.0, triangles, keys, load_regions(rigs_path("regions.toml")))
+
+
+def triangles_of(obj: bpy.types.Object) -> np.ndarray:
+    """(T, 3) int32, indices of vertices."""
+    obj.data.calc_loop_triangles()
+    triangles = np.empty(len(obj.data.loop_triangles) * 3, dtype=np.int32)
+    obj.data.loop_triangles.foreach_get("vertices", triangles)
+    return triangles.reshape(-1, 3)
 
 
 def _key_positions(key: bpy.types.ShapeKey) -> np.ndarray:
@@ -91,17 +99,17 @@ def store_rest(obj: bpy.types.Object) -> None:
     """Writes the neutral positions, in mm, as a vertex attribute."""
     mesh = obj.data
     attribute = mesh.attributes.get(REST_ATTRIBUTE) or mesh.attributes.new(REST_ATTRIBUTE, "FLOAT_VECTOR", "POINT")
-    attribute.data.foreach_set("vector", _position_mm(obj).ravel())
+    attribute.data.foreach_set("vector", position_mm(obj).ravel())
 
 
-def _position_mm(obj: bpy.types.Object) -> np.ndarray:
+def position_mm(obj: bpy.types.Object) -> np.ndarray:
     """(V, 3) float32: the neutral face at the object's scale, in mm."""
     positions = np.empty(len(obj.data.vertices) * 3, dtype=np.float32)
     obj.data.vertices.foreach_get("co", positions)
-    return positions.reshape(-1, 3) * _position_scale_mm(obj)
+    return positions.reshape(-1, 3) * position_scale_mm(obj)
 
 
-def _position_scale_mm(obj: bpy.types.Object) -> np.ndarray:
+def position_scale_mm(obj: bpy.types.Object) -> np.ndarray:
     """(3,) float32: mm per unit of the mesh, along its axes. Of a mirrored object the lengths: the mesh is not mirrored
     with it, so its left stays left and its up stays up."""
     mm_per_unit = 1000.0 * bpy.context.scene.unit_settings.scale_length
@@ -144,7 +152,7 @@ def read_surface(obj: bpy.types.Object) -> Surface:
     mesh.loop_triangles.foreach_get("loops", triangles)
     regions = {region: _group_weights(obj, GROUP_PREFIX + region) for region in face_regions(obj)}
     return Surface(
-        _position_mm(obj), uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions, _shape_keys(obj)
+        position_mm(obj), uv.reshape(-1, 2), triangles.reshape(-1, 3), corner_vertex, regions, _shape_keys(obj)
     )
 
 
@@ -165,7 +173,7 @@ def _shape_keys(obj: bpy.types.Object) -> ShapeKeys | None:
             delta *= _group_weights(obj, block.vertex_group)[:, None]
         if not block.mute and delta.any():
             names.append(block.name)
-            deltas.append(delta * _position_scale_mm(obj))
+            deltas.append(delta * position_scale_mm(obj))
     return ShapeKeys(tuple(names), np.float32(deltas)) if names else None
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 
-from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering
+from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering, thin
 from .errors import InputError, nearest
 from .parameters import PARAMETERS, Skin
 from .quality import DEFAULT, Settings, preset
@@ -69,6 +69,11 @@ class Plan:
     @property
     def active(self) -> tuple[Effect, ...]:
         return tuple(e for e in EFFECTS if self.decisions[e.id].active)
+
+    @property
+    def walk(self) -> bool:
+        """Whether the table holds the medium of a walk too."""
+        return self.decisions[thin.EFFECT.id].active
 
     def without(self, effect_id: str) -> Plan:
         """The plan as it would be if one effect did not exist, to price that effect."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .effects import Fragment, ShaderInput
-from .lut import LOBES, layout
+from .lut import LOBES, WALK_QUANTITIES, layout
 from .plan import Axis, Plan
 from .resources import shaders_path
 
@@ -29,7 +29,7 @@ def assemble(plan: Plan) -> dict[str, Shader]:
     stages = {fragment.stage for fragment in plan.fragments}
     from_points = {item.key for f in plan.fragments for item in f.inputs if item.source == "chromophores"}
     axes = plan.axes
-    form = layout(axes, plan.settings.lobes)
+    form = layout(axes, plan.settings.lobes, plan.walk)
     height, width = form.shape
     defines: dict[str, object] = {
         "AXES": min(len(axes), 2),
@@ -94,14 +94,12 @@ TABLE_MIX = "table_mix"
 
 
 def _lobe_inputs(plan: Plan) -> str:
-    lines = [
-        f"    color weight_{k}{suffix} = 0, color d_mm_{k}{suffix} = 0,\n"
-        for suffix in table_slices(plan.axes)
-        for k in range(plan.settings.lobes)
-    ]
+    sockets = [name for suffix in table_slices(plan.axes) for name in lobe_sockets(plan.settings.lobes, suffix, plan.walk)]
+    lines = [f"    color {name} = 0,\n" for name in sockets]
     return "".join(lines) + (f"    float {TABLE_MIX} = 0,\n" if layout(plan.axes).mixed else "")
 
 
-def lobe_sockets(lobes: int = LOBES, suffix: str = "") -> list[str]:
-    """Names of the surface shader's lobe inputs in the order of the table's quantities."""
-    return [f"{kind}_{k}{suffix}" for kind in ("weight", "d_mm") for k in range(lobes)]
+def lobe_sockets(lobes: int = LOBES, suffix: str = "", walk: bool = False) -> list[str]:
+    """Names of the surface shader's inputs from the table, in the order of its quantities."""
+    names = [f"{kind}_{k}" for kind in ("weight", "d_mm") for k in range(lobes)]
+    return [name + suffix for name in (*names, *(WALK_QUANTITIES if walk else ()))]

@@ -2,7 +2,7 @@
 
 from . import (
     anatomy, grown, mottle, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map, strain,
-    wrinkles,
+    thin, wrinkles,
 )
 from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
@@ -18,7 +18,8 @@ EFFECTS: tuple[Effect, ...] = (
     pressure.EFFECT,
     relief.EFFECT,
     wrinkles.EFFECT,
-    residual.EFFECT,
+    thin.EFFECT,
+    residual.EFFECT,  # after the walk, whose light it colours too
     oil.EFFECT,  # after the residual: the film lies over brows and make-up too
 )
 
