@@ -78,6 +78,7 @@ openimageio: $(OIIO_STAMP) ## Fetch the libraries and headers of OpenImageIO
 docs: ## Write the pages that follow from the schema anew
 	$(PYTHON) tools/write_parameter_docs.py
 	$(PYTHON) tools/write_facs_docs.py
+	$(PYTHON) tools/write_skin_presets.py
 
 stub: native ## Write the committed stub of the native module anew
 	$(PY) -m nanobind.stubgen -m sanguine_core._core -o native/python/sanguine_core/_core.pyi

@@ -182,6 +182,12 @@ def remove_emotion(armature: bpy.types.Object, name: str) -> None:
     _drive_units(armature)
 
 
+def controls_of(face: bpy.types.Object) -> bpy.types.Object | None:
+    """The armature that carries the face's controls."""
+    rigs = [face.parent, *(m.object for m in face.modifiers if m.type == "ARMATURE")]
+    return next((rig for rig in rigs if rig is not None and rig.type == "ARMATURE"), None)
+
+
 def emotions_of(armature: bpy.types.Object) -> tuple[str, ...]:
     """The emotions that are on a rig."""
     return _on(armature, EMOTION_CONTROLS)
@@ -423,9 +429,14 @@ def drive(
         raise ValueError(f"{path}: Blender does not take this as a simple expression: {expression}")
 
 
+def control_path(name: str) -> str:
+    """Where the armature object keeps a slider."""
+    return f'pose.bones["{CONTROL_BONE}"]["{name}"]'
+
+
 def _target_path(name: str) -> str:
     """Where the armature object keeps a control or an intermediate value."""
-    return f'["{name}"]' if name.startswith(_INTERMEDIATE) else f'pose.bones["{CONTROL_BONE}"]["{name}"]'
+    return f'["{name}"]' if name.startswith(_INTERMEDIATE) else control_path(name)
 
 
 def _driver(owner: bpy.types.ID, path: str) -> bpy.types.FCurve | None:

@@ -21,7 +21,7 @@ from .controls import CONTROL_BONE, DriveReport, add_controls, drive_shape_keys
 from .material import MARK
 from .migration import bring_up_to_date, newer
 from .osl import missing_osl
-from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of
+from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of, switched_off
 from .removal import all_or_nothing, controls_of, mark_rig, nothing_left_behind, remember_keys
 from .skin import apply_skin, our_slot, skin_slot
 from .surface import face_regions, find_face_regions, has_pressure, has_shape_keys
@@ -72,6 +72,7 @@ def live_plan(face: bpy.types.Object) -> Plan:
             shape_keys=has_shape_keys(face),
             pressure=has_pressure(face),
             presses=bone is not None and PRESSURE_CONTROL in bone,
+            switched_off=switched_off(face),
         ),
         quality_of(face),
     )

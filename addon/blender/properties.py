@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
 
 from ..domain.effects import EFFECTS, Growth, residual, skin_map
@@ -9,17 +11,19 @@ from ..domain.effects.effect import Interval
 from ..domain.parameters import PARAMETERS
 from ..domain.people import AGES, SEEDS, Person
 from ..domain.plan import default_strengths
-from ..domain.quality import DEFAULT, PRESETS, Settings, preset
+from ..domain.quality import BEST_DELTA_E, DEFAULT, PRESETS, WITHIN, Point, Settings, chosen_point
+from . import headline
 from .images import measure_range, stored_range
+from .swatch import swatch_of
 
 
 def _skin_properties() -> dict[str, object]:
     made = {}
     for row in PARAMETERS.values():
-        unit = f" [{row.unit}]" if row.unit not in ("", "1") else ""
+        unit = "a share of 1" if row.unit in ("", "1") else row.unit
         made[row.id] = bpy.props.FloatProperty(
             name=row.label,
-            description=f"{row.help}{unit}. Source: {row.source}",
+            description=f"{row.help}. {row.hard_min:g} to {row.hard_max:g}, in {unit}. Source: {row.source}",
             default=row.default,
             min=row.hard_min,
             max=row.hard_max,
@@ -32,8 +36,13 @@ def _skin_properties() -> dict[str, object]:
     for effect in EFFECTS:
         if effect.default_strength is not None:
             made[strength_property(effect.id)] = bpy.props.FloatProperty(
-                name=effect.label, description=effect.help, default=effect.default_strength, min=0.0, max=1.0,
-                override={"LIBRARY_OVERRIDABLE"},
+                name=effect.label, description=f"{effect.help.rstrip('.')}. Strength, 0 (costs nothing) to 1",
+                default=effect.default_strength, min=0.0, max=1.0, override={"LIBRARY_OVERRIDABLE"},
+            )
+        if effect.switchable:
+            made[switch_property(effect.id)] = bpy.props.BoolProperty(
+                name=effect.label, description=f"{effect.help.rstrip('.')}. Off, it costs nothing; apply the skin to see it",
+                default=True, override={"LIBRARY_OVERRIDABLE"},
             )
     made |= _growth_properties()
     channels = "red {}, green {}, blue {}, alpha {}".format(*skin_map.CHANNELS)
@@ -43,13 +52,32 @@ def _skin_properties() -> dict[str, object]:
         )
     made["quality"] = bpy.props.EnumProperty(
         name="Quality",
-        description="How finely the skin is simulated: samples change at once, the rest when the skin is applied",
-        items=[(name, name.capitalize(), f"{point.measured} (one core)") for name, point in PRESETS.items()],
+        description="How finely the skin is simulated: samples change at once, the rest when the skin is applied. Delta E 2000 "
+        "against path-traced layered skin, 95 of 100 pixels within it, and seconds of one core (docs/accuracy_picture.md)",
+        items=[
+            *((name, name.capitalize(), f"{point.measured} (one core); {point.means}") for name, point in PRESETS.items()),
+            (WITHIN, "Cheapest Within", "The cheapest of all measured settings whose error is within the Delta E that you give"),
+        ],
         default=DEFAULT,
         update=_set_samples,
         override={"LIBRARY_OVERRIDABLE"},
     )
-    return made
+    # Rounded up, so that what a slider shows can be met.
+    best = math.ceil(100.0 * BEST_DELTA_E) / 100.0
+    made["delta_e"] = bpy.props.FloatProperty(
+        name="Delta E",
+        description=f"The largest error allowed: Delta E 2000 that 95 of 100 pixels are within, {best:g} (the best that was "
+        "measured) or more; 1 is about the least that an eye can tell side by side",
+        default=2.0, min=best, max=20.0, soft_max=5.0, precision=2, step=10, update=_set_samples,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    made["skin_colour"] = bpy.props.FloatVectorProperty(
+        name="Skin Colour",
+        description="The skin as the sliders stand, at rest, in diffuse daylight (D65), without highlights: linear, in the "
+        "file's working space",
+        subtype="COLOR", size=3, min=0.0, max=1.0, get=_skin_colour, options=set(),
+    )
+    return made | headline.properties()
 
 
 def _growth_properties() -> dict[str, object]:
@@ -90,16 +118,27 @@ def set_person(obj: bpy.types.Object, person: Person) -> None:
 
 
 def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    context.scene.cycles.samples = preset(settings.quality).samples
+    context.scene.cycles.samples = chosen_point(settings.quality, settings.delta_e).samples
+
+
+def _skin_colour(settings: bpy.types.PropertyGroup) -> tuple[float, float, float]:
+    return swatch_of(skin_of(settings.id_data)).rgb
 
 
 def strength_property(effect_id: str) -> str:
     return f"strength_{effect_id}"
 
 
-SkinSettings = type(
-    "SANGUINE_PG_skin", (bpy.types.PropertyGroup,), {"__annotations__": _skin_properties(), "__doc__": __doc__}
-)
+def switch_property(effect_id: str) -> str:
+    return f"use_{effect_id}"
+
+
+_PROPERTIES = _skin_properties()
+
+VIEWS = frozenset(name for name, made in _PROPERTIES.items() if "get" in made.keywords)
+"""Properties that hold nothing themselves: they show, and set, what stands elsewhere."""
+
+SkinSettings = type("SANGUINE_PG_skin", (bpy.types.PropertyGroup,), {"__annotations__": _PROPERTIES, "__doc__": __doc__})
 
 CLASSES = (SkinSettings,)
 
@@ -127,6 +166,12 @@ def strengths_of(obj: bpy.types.Object) -> dict[str, float]:
     }
 
 
+def switched_off(obj: bpy.types.Object) -> frozenset[str]:
+    return frozenset(
+        effect.id for effect in EFFECTS if effect.switchable and not getattr(obj.sanguine, switch_property(effect.id))
+    )
+
+
 def images_of(obj: bpy.types.Object) -> dict[str, bpy.types.Image]:
     """Map id -> image, of the maps that the object's properties point to; none where the add-on is not registered."""
     settings = getattr(obj, "sanguine", None)
@@ -148,5 +193,10 @@ def measure_maps(obj: bpy.types.Object) -> None:
         measure_range(image, skin_map.CHANNELS)
 
 
+def point_of(obj: bpy.types.Object) -> Point:
+    """The measured settings that somebody chose."""
+    return chosen_point(obj.sanguine.quality, obj.sanguine.delta_e)
+
+
 def quality_of(obj: bpy.types.Object) -> Settings:
-    return preset(obj.sanguine.quality).settings
+    return point_of(obj).settings

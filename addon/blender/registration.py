@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import adopt, animation, capture, example, operators, panels, properties
+from . import adopt, animation, capture, example, operators, panels, presets, properties, swatch
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *example.CLASSES, *animation.CLASSES, *capture.CLASSES, *panels.CLASSES)
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *example.CLASSES, *animation.CLASSES, *capture.CLASSES, *presets.CLASSES, *panels.CLASSES)
 _commands: list[object] = []
 
 
@@ -15,6 +15,8 @@ def register() -> None:
         bpy.utils.register_class(cls)
     properties.attach()
     example.add_menu()
+    presets.register()
+    swatch.register()
     if hasattr(bpy.utils, "register_cli_command"):  # Blender 4.2 has none
         _commands.append(bpy.utils.register_cli_command("sanguine", _command))
 
@@ -22,6 +24,8 @@ def register() -> None:
 def unregister() -> None:
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
+    swatch.unregister()
+    presets.unregister()
     example.remove_menu()
     properties.detach()
     for cls in reversed(_CLASSES):

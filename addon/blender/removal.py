@@ -19,11 +19,12 @@ from ..domain.errors import InputError
 from .albedo import READ_FROM
 from .bake import clear_bake
 from .blood import PROFILE, remove_blood
-from .controls import CONTROL_BONE, drive_shape_keys, remove_controls, remove_drivers, remove_head_drivers
+from .controls import CONTROL_BONE, controls_of, drive_shape_keys, remove_controls, remove_drivers, remove_head_drivers
 from .controls import remove_shape_key_drivers
 from .curves import curves, drop_empty_animation, remove_curve
 from .material import MARK, remove_skin_material
 from .poses import CATALOG_TAG
+from .properties import VIEWS
 from .skin import VERSION, our_slot
 from .strain import remove_components
 from .surface import GROUP_PREFIX, REST_ATTRIBUTE
@@ -33,12 +34,6 @@ BEFORE = "sanguine_before"
 
 _PLACE = ("location", "rotation_mode", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 _NEW = ("objects", "meshes", "armatures", "materials", "node_groups", "images", "texts", "actions", "scenes")
-
-
-def controls_of(face: bpy.types.Object) -> bpy.types.Object | None:
-    """The armature that carries the face's controls."""
-    rigs = [face.parent, *(m.object for m in face.modifiers if m.type == "ARMATURE")]
-    return next((rig for rig in rigs if rig is not None and rig.type == "ARMATURE"), None)
 
 
 def has_skin(face: bpy.types.Object) -> bool:
@@ -368,7 +363,7 @@ def _settings(face: bpy.types.Object) -> dict[str, Any]:
     return {
         row.identifier: getattr(face.sanguine, row.identifier)
         for row in rows
-        if row.identifier not in ("name", "rna_type") and row.type != "POINTER" and face.sanguine.is_property_set(row.identifier)
+        if row.identifier not in ("name", "rna_type", *VIEWS) and row.type != "POINTER" and face.sanguine.is_property_set(row.identifier)
     }
 
 

@@ -10,7 +10,7 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Annotated, Literal
@@ -205,6 +205,28 @@ def person(tone: str, sex: str = "female", age_years: float = 30.0, seed: int = 
     return _person(tone, growth)
 
 
+def typical(tone: str) -> Person:
+    """The middle of a measured class (a label of CLASSES): every quantity at its mean, neither female nor male, at the age
+    to which the measurements were reduced, with what more than half of such women, and of such men, have: at its median
+    strength in the sex that has less of it."""
+    if tone not in CLASSES:
+        raise InputError(f"tone: '{tone}': no class of measured skin, {nearest(tone, CLASSES)}")
+    growth, ita = Growth(0, float(MEASURED.reference_age_years), 0.5, 0.5), CLASSES[tone].ita
+    skin = default_skin() | _quantities(ita, growth, np.zeros(len(MEASURED.quantities)))
+    strengths = {}
+    for trait in TRAITS.values():
+        both = [replace(growth, masculinity=masculinity) for masculinity in SEXES.values()]
+        strength = min(_at(trait.strength, one) for one in both)
+        if min(_share(trait, ita, one) for one in both) <= 0.5 or strength < _FAINTEST:
+            continue
+        if trait.id in PARAMETERS:
+            skin[trait.id] = min(max(strength, PARAMETERS[trait.id].hard_min), PARAMETERS[trait.id].hard_max)
+        else:
+            strengths[trait.id] = round(min(strength, 1.0), 4)
+    skin["melanin"] = melanin_for(skin, ita)
+    return Person(tone, ita, {k: float(f"{v:.6g}") for k, v in skin.items()}, strengths, growth)
+
+
 @lru_cache(maxsize=256)
 def _person(tone: str, growth: Growth) -> Person:
     ita = _angle(tone, growth.seed)
@@ -241,6 +263,11 @@ def _angle(tone: str, seed: int) -> float:
 
 def _drawn(ita: float, growth: Growth) -> dict[str, float]:
     """The measured quantities of an individual of this tone."""
+    return _quantities(ita, growth, np.array([_normal(growth.seed, name) for name in MEASURED.quantities]))
+
+
+def _quantities(ita: float, growth: Growth, draws: np.ndarray) -> dict[str, float]:
+    """The same from `draws`, standard normal, in the order of MEASURED.quantities."""
     classes = sorted(CLASSES.values(), key=lambda row: row.ita)
     share = [float(np.interp(ita, [row.ita for row in classes], unit)) for unit in np.eye(len(classes))]
     mean = sum(s * np.array(row.mean) for s, row in zip(share, classes, strict=True))
@@ -248,7 +275,6 @@ def _drawn(ita: float, growth: Growth) -> dict[str, float]:
     age = min(max(growth.age_years, MEASURED.age_years[0]), MEASURED.age_years[1])
     mean = mean + np.array(MEASURED.masculinity) * (growth.masculinity - 0.5)
     mean = mean + np.array(MEASURED.decade) * (age - MEASURED.reference_age_years) / 10
-    draws = np.array([_normal(growth.seed, name) for name in MEASURED.quantities])
     scaled = mean + np.linalg.cholesky(covariance) @ draws
     rows = {row["id"]: row for row in sanguine_core.fit_parameters()}
     return {
@@ -311,6 +337,24 @@ def face_lab(skin: Skin, ita: float) -> np.ndarray:
     return np.array(list(MEASURED.sites.values())) @ lab / sum(MEASURED.sites.values())
 
 
+def face_ita(skin: Skin) -> float:
+    """The ITA of a face with this skin, degrees: the angle that `face_lab` has when it is told this very angle.
+
+    How much the surface reflects depends on the tone, by a few percent of the light, so this settles at once.
+    """
+    ita = sum(ITA_RANGE) / 2
+    for _ in range(8):
+        before, ita = ita, _ita(face_lab(skin, ita))
+        if abs(ita - before) < 0.01:
+            break
+    return ita
+
+
+def class_at(ita: float) -> str:
+    """The class of measured skin (a label of CLASSES) of an angle; the last one beyond what was measured."""
+    return next((name for name, row in CLASSES.items() if ita >= row.ita_low), list(CLASSES)[-1])
+
+
 def _ita(lab: np.ndarray) -> float:
     """Chardin et al. 1991, degrees; L* of 50 to 50 is where it turns from positive to negative."""
     return math.degrees(math.atan2(lab[0] - 50.0, lab[2]))
@@ -322,11 +366,15 @@ def traits_of(ita: float, growth: Growth) -> dict[str, float]:
 
 
 def _trait(trait: Trait, ita: float, growth: Growth) -> float:
-    share = _at(trait.share, growth) * float(np.interp(ita, *zip(*trait.light, strict=True)))
-    if chance(growth.seed, f"{trait.id} has") >= share:
+    if chance(growth.seed, f"{trait.id} has") >= _share(trait, ita, growth):
         return 0.0
     strength = _at(trait.strength, growth) * math.exp(trait.spread * _normal(growth.seed, trait.id))
     return round(min(strength, 1.0), 4) if strength >= _FAINTEST else 0.0
+
+
+def _share(trait: Trait, ita: float, growth: Growth) -> float:
+    """How many of such people have the trait."""
+    return _at(trait.share, growth) * float(np.interp(ita, *zip(*trait.light, strict=True)))
 
 
 def _at(curve: Curve | BySex, growth: Growth) -> float:

@@ -7,6 +7,7 @@ from sanguine.blender import operators, panels, skin
 from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.errors import InputError
 from sanguine.domain.quality import DEFAULT, PRESETS
+from tests.blender.layouts import draw
 
 
 @pytest.fixture
@@ -23,38 +24,6 @@ def grid(regions=FACE_REGIONS):
     for region in regions:
         face.vertex_groups.new(name=f"sanguine_{region}").add([0, 1, 7], 1.0, "REPLACE")
     return face
-
-
-class Layout:
-    """Stands in for Blender's layout, which exists only while a window draws: takes what a panel asks for."""
-
-    def __init__(self):
-        self.drawn = []
-
-    def operator(self, name, **_):
-        self.drawn.append(name)
-
-    def operator_menu_enum(self, name, _prop, **_):
-        self.drawn.append(name)
-
-    def prop(self, data, name, **_):
-        # Blender draws an unknown property as an error in red: here it is one.
-        data.path_resolve(name)
-        self.drawn.append(name)
-
-    def label(self, text, **_):
-        self.drawn.append(text)
-
-    def column(self, **_):
-        return self
-
-    row = column
-
-
-def draw(panel):
-    layout = Layout()
-    panel.draw(type("Panel", (), {"layout": layout})(), bpy.context)
-    return layout.drawn
 
 
 def test_nothing_selected_is_refused_with_what_to_do(addon):
@@ -75,13 +44,12 @@ def test_a_mesh_without_uvs_gives_one_line(addon):
 def test_apply_gives_material_sliders_and_panel(addon, engine):
     bpy.context.scene.render.engine = engine
     face = grid()
-    assert draw(panels.SANGUINE_PT_main) == ["sanguine.adopt", "sanguine.apply_skin"]
+    assert draw(panels.SANGUINE_PT_main)[:2] == ["sanguine.adopt", "sanguine.apply_skin"]
     assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
     assert bpy.context.scene.render.engine == engine
-    drawn = draw(panels.SANGUINE_PT_main)
-    assert {'["anger"]', '["happy"]', '["sad"]', '["fear"]', '["blood"]'} <= set(drawn)
-    assert {"melanin", "hemoglobin", "strength_relief"} <= set(draw(panels.SANGUINE_PT_skin))
-    assert any(line.startswith("Perfusion: ") for line in draw(panels.SANGUINE_PT_plan))
+    assert {'["anger"]', '["happy"]', '["sad"]', '["fear"]', '["blood"]', "hemoglobin"} <= set(draw(panels.SANGUINE_PT_blood))
+    assert "melanin" in draw(panels.SANGUINE_PT_skin) and "strength_relief" in draw(panels.SANGUINE_PT_features)
+    assert "use_perfusion" in draw(panels.SANGUINE_PT_plan)
     assert "sanguine" in face.material_slots[0].material
     # The controls are found from the face and from the rig.
     bpy.context.view_layer.objects.active = face.parent
@@ -125,7 +93,7 @@ def test_quality_is_shown_with_its_numbers_and_acts(addon):
     for name, point in PRESETS.items():
         face.sanguine.quality = name
         assert bpy.context.scene.cycles.samples == point.samples
-        drawn = draw(panels.SANGUINE_PT_skin)
+        drawn = draw(panels.SANGUINE_PT_main)
         assert "quality" in drawn and point.measured in drawn
         assert operators.live_plan(face).settings == point.settings
     face.sanguine.quality = "draft"

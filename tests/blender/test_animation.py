@@ -9,7 +9,8 @@ from sanguine.blender import controls, panels
 from sanguine.blender.bake import RECORD
 from sanguine.blender.curves import curves
 from sanguine.blender.operators import emotion_bone, live_plan
-from tests.blender.test_addon import draw, grid
+from tests.blender.layouts import Layout, draw
+from tests.blender.test_addon import grid
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def test_an_emotion_is_on_the_rig_when_asked_for_and_costs_nothing_before(face):
     bpy.context.view_layer.update()
     assert face["blood_oxygenation_elsewhere"] < -0.05
     assert live_plan(face).fragments != fragments
-    assert '["hypoxia"]' in draw(panels.SANGUINE_PT_main)
+    assert '["hypoxia"]' in draw(panels.SANGUINE_PT_blood)
     assert bpy.ops.sanguine.remove_feeling(feeling="hypoxia") == {"FINISHED"}
     bpy.ops.sanguine.apply_skin()
     assert set(face.keys()) == set(before) and live_plan(face).fragments == fragments
@@ -93,14 +94,8 @@ def test_exaggeration_is_called_so(face):
     def labels():
         found = []
 
-        class Layout:
-            def prop(self, _data, _name, text="", **_):
-                found.append(text)
-
-            def operator(self, *_, **__):
-                pass
-
-            def label(self, text, **_):
+        class Texts(Layout):
+            def prop(self, data, name, text="", **_):
                 found.append(text)
 
             def column(self, **_):
@@ -108,7 +103,7 @@ def test_exaggeration_is_called_so(face):
 
             row = column
 
-        panels.SANGUINE_PT_main.draw(type("Panel", (), {"layout": Layout()})(), bpy.context)
+        panels.SANGUINE_PT_blood.draw(type("Panel", (), {"layout": Texts()})(), bpy.context)
         return found
 
     assert "Blood" in labels()
