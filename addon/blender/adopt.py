@@ -16,8 +16,18 @@ from ..domain.people import SEXES, TONES, person
 from .albedo import picture_tasks
 from .controls import CONTROL_BONE
 from .material import MARK
-from .operators import SHADING, active_face, albedo_of, live_plan, may_change, new_rig, put_controls, tell_up_to_date, window_progress
-from .osl import missing_osl
+from .operators import (
+    SHADING,
+    active_face,
+    albedo_of,
+    live_plan,
+    may_change,
+    new_rig,
+    put_controls,
+    shading_of,
+    tell_up_to_date,
+    window_progress,
+)
 from .properties import growth_of, measure_maps, set_person, strength_property
 from .removal import Change, all_or_nothing, controls_of, has_skin, remove_skin
 from .skin import skin_slot, skin_tasks
@@ -60,10 +70,11 @@ def adopt_tasks(context: bpy.types.Context, face: bpy.types.Object, tone: str, s
     if regions := find_face_regions(face):
         (said.lines if regions.startswith("regions found") else said.warnings).append(regions)
     plan = live_plan(face)
-    material = yield from skin_tasks(face, rig, plan, slot)
-    context.scene.cycles.shading_system = True
+    chosen = shading_of(context.scene, face)
+    material = yield from skin_tasks(face, rig, plan, slot, shading=chosen.shading)
     running = ", ".join(effect.label for effect in plan.active)
     said.lines.append(f"{running}; {material[MARK]['entries']} skins solved; {len(driven.driven)} shape keys driven")
+    said.lines.append(chosen.line)
     return said
 
 
@@ -132,9 +143,6 @@ class SANGUINE_OT_adopt(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if why := missing_osl():
-            cls.poll_message_set(why[0].upper() + why[1:])
-            return False
         if not _may_adopt(cls, context):
             return False
         if has_skin(active_face(context)):

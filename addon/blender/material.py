@@ -1,4 +1,5 @@
-"""The skin material of a plan: a node group with ranges and tooltips around two OSL scripts and a packed table.
+"""The skin material of a plan: a node group with ranges and tooltips around two OSL scripts and a packed table, or around
+the plain nodes that the same text compiles to.
 
 Everything the material reads at render time is a custom property, a mesh attribute or a packed image, so the
 file renders the same without the add-on.
@@ -16,6 +17,7 @@ from ..domain.lut import Table, bake
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shader import TABLE_MIX, Shader, assemble, lobe_sockets, table_slices
+from ..domain.shading import NODES, OSL
 from .colour import sign_table, working_space
 from .images import Pixels, data_image
 from .osl import script_node
@@ -44,9 +46,12 @@ _MM_PER_M = 1000.0
 
 
 def build_skin_material(
-    name: str, plan: Plan, maps: Mapping[str, Map], table: Table | None = None
+    name: str, plan: Plan, maps: Mapping[str, Map], table: Table | None = None, shading: str = OSL
 ) -> bpy.types.Material:
-    """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`. table: solved here if left out."""
+    """A new material for `plan`. maps: map id -> what it shows, for each of `plan.maps`. table: solved here if left out.
+
+    shading: OSL, or NODES for its plain twin.
+    """
     if table is None:
         table = bake(plan.axes, plan.skin, working_space(), lobes=plan.settings.lobes, walk=plan.walk)
     material = bpy.data.materials.new(name)
@@ -55,7 +60,7 @@ def build_skin_material(
     tree = material.node_tree
     tree.nodes.clear()
     group = tree.nodes.new("ShaderNodeGroup")
-    group.node_tree = _group(name, plan, table, maps)
+    group.node_tree = _group(name, plan, table, maps, shading)
     group.name = group.label = name
     group.width = 220
     output = tree.nodes.new("ShaderNodeOutputMaterial")
@@ -63,6 +68,7 @@ def build_skin_material(
     tree.links.new(group.outputs["BSDF"], output.inputs["Surface"])
     material[MARK] = {
         "effects": [effect.id for effect in plan.active], "entries": plan.entries, "fingerprint": plan.fingerprint,
+        "shading": shading,
     }
     return material
 
@@ -73,8 +79,11 @@ def remove_skin_material(material: bpy.types.Material) -> None:
     bpy.data.materials.remove(material)
     for group in groups:
         parts = set(_parts(group))
-        if not group.users:
-            bpy.data.node_groups.remove(group)
+        inner = {part for part in parts if isinstance(part, bpy.types.NodeTree)}
+        parts -= inner
+        for tree in (group, *inner):
+            if not tree.users:
+                bpy.data.node_groups.remove(tree)
         # Blender gives every text a fake user.
         bpy.data.batch_remove([held for held in parts if held.users == int(held.use_fake_user)])
 
@@ -93,21 +102,24 @@ def _groups(material: bpy.types.Material) -> list[bpy.types.NodeTree]:
 
 
 def _parts(group: bpy.types.NodeTree) -> Iterator[bpy.types.ID]:
-    """Images and texts of a skin's group, those that come with the face apart."""
+    """Images, texts and inner groups of a skin's group, those that come with the face apart."""
     for node in group.nodes:
         if node.bl_idname == "ShaderNodeTexImage" and node.label not in _OF_THE_FACE and node.image:
             yield node.image
         elif node.bl_idname == "ShaderNodeScript" and node.script:
             yield node.script
+        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree:
+            yield from _parts(node.node_tree)
+            yield node.node_tree
 
 
-def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map]) -> bpy.types.NodeTree:
+def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map], shading: str) -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
-    build = _Builder(name, tree, plan, maps)
+    build = _Builder(name, tree, plan, maps, shading)
     tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
     shaders = assemble(plan)
     build.points = points = build.script("chromophores", shaders["chromophores"])
-    lobes = build.script("surface", shaders["surface"])
+    lobes = build.script("surface", shaders["surface"], ("Normal",) if "relief" in shaders else ())
     build.base_values(points)
     unit_per_mm = 1.0 / (_MM_PER_M * bpy.context.scene.unit_settings.scale_length)
     lobes.inputs["unit_per_mm"].default_value = unit_per_mm
@@ -132,8 +144,10 @@ class _Builder:
 
     points: bpy.types.Node  # the first script, once it is made
 
-    def __init__(self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, Map]) -> None:
-        self.name, self.tree, self.plan = name, tree, plan
+    def __init__(
+        self, name: str, tree: bpy.types.NodeTree, plan: Plan, maps: Mapping[str, Map], shading: str
+    ) -> None:
+        self.name, self.tree, self.plan, self.shading = name, tree, plan, shading
         self.begin = tree.nodes.new("NodeGroupInput")
         self.sources: dict[tuple[str, str], bpy.types.NodeSocket] = {}
         self.images = {key: self._image(key, maps[key]) for key in plan.maps}
@@ -147,8 +161,17 @@ class _Builder:
     def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
         self.tree.links.new(source, target)
 
-    def script(self, stage: str, shader: Shader) -> bpy.types.Node:
-        node = script_node(self.tree, f"{self.name} {stage}", shader.source)
+    def script(self, stage: str, shader: Shader, given: tuple[str, ...] = ()) -> bpy.types.Node:
+        """The node of a stage. given: sockets that are linked later on, although their default is no number."""
+        name = f"{self.name} {stage}"
+        if self.shading == NODES:
+            # Its libraries are read only where a plain material is made.
+            from ..domain.osl_graph import compile_stage
+            from .plain_nodes import plain_node
+
+            node = plain_node(self.tree, name, compile_stage(stage, shader.source, given), data_image)
+        else:
+            node = script_node(self.tree, name, shader.source)
         for item in shader.inputs:
             self.link(self.source(item), node.inputs[item.name])
         return node

@@ -13,6 +13,7 @@ from ..domain.blood import BLOOD, PRESSURE_CONTROL
 from ..domain.facs import DEFAULT_EMOTIONS
 from ..domain.people import SEXES, TONES, person
 from ..domain.plan import Plan, make_plan
+from ..domain.shading import Choice, choose
 from .albedo import read_picture
 from ..domain.vascular import reach
 from .blood import blood_model, blood_sliders
@@ -20,7 +21,7 @@ from .colour import follow_working_space, images_in, strange_images
 from .controls import CONTROL_BONE, DriveReport, add_controls, drive_shape_keys
 from .material import MARK
 from .migration import bring_up_to_date, newer
-from .osl import missing_osl
+from .osl import renderer_of
 from .properties import growth_of, map_ranges_of, measure_maps, quality_of, set_person, skin_of, strengths_of, switched_off
 from .removal import all_or_nothing, controls_of, mark_rig, nothing_left_behind, remember_keys
 from .skin import apply_skin, our_slot, skin_slot
@@ -78,6 +79,11 @@ def live_plan(face: bpy.types.Object) -> Plan:
     )
 
 
+def shading_of(scene: bpy.types.Scene, face: bpy.types.Object) -> Choice:
+    """What the face's skin is to be made of, and why. Raises InputError where it cannot be."""
+    return choose(face.sanguine.shading, renderer_of(scene))
+
+
 def may_change(cls: type[bpy.types.Operator], face: bpy.types.Object | None) -> bool:
     if face is None:
         cls.poll_message_set("Select a face: a mesh object")
@@ -107,9 +113,6 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave to object mode first")
             return False
-        if why := missing_osl():
-            cls.poll_message_set(why[0].upper() + why[1:])
-            return False
         return may_change(cls, active_face(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -124,16 +127,17 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
                 measure_maps(face)
                 regions = find_face_regions(face)
                 plan = live_plan(face)
-                material = apply_skin(face, rig, plan, slot)
+                chosen = shading_of(context.scene, face)
+                material = apply_skin(face, rig, plan, slot, shading=chosen.shading)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        context.scene.cycles.shading_system = True
         for line in driven.lines:
             self.report({"INFO"}, line)
         running = ", ".join(effect.label for effect in plan.active)
         done = f"{running}; {material[MARK]['entries']} skins solved; {len(driven.driven)} shape keys driven"
         self.report({"INFO"}, f"{done}; {regions}" if regions else done)
+        self.report({"INFO"}, chosen.line)
         return {"FINISHED"}
 
 

@@ -9,16 +9,32 @@ from pathlib import Path
 
 import bpy
 
+from ..domain.shading import Renderer
+
 
 def missing_osl() -> str:
-    """Why this Blender cannot show the skin's material, one line, "" when it can. Debian's Cycles is built without OSL."""
+    """Why this Blender runs no OSL, one line, "" when it does. Debian's Cycles is built without."""
     try:
         import _cycles
     except ImportError:
-        return "this Blender has no Cycles, which renders the skin"
-    if not _cycles.with_osl:
-        return "the Cycles of this Blender was built without OSL, which the skin is made of: use a Blender of blender.org"
-    return ""
+        return "this Blender has no Cycles"
+    return "" if _cycles.with_osl else "the Cycles of this Blender was built without OSL"
+
+
+def renderer_of(scene: bpy.types.Scene) -> Renderer:
+    """What would render the scene here."""
+    device = "CPU"
+    if getattr(getattr(scene, "cycles", None), "device", "CPU") == "GPU":
+        addon = bpy.context.preferences.addons.get("cycles")
+        device = getattr(addon.preferences, "compute_device_type", "NONE") if addon is not None else "NONE"
+        device = "CPU" if device == "NONE" else device
+    return Renderer(scene.render.engine, missing_osl(), device)
+
+
+def has_scripts() -> bool:
+    """Whether a material of the file holds a script node."""
+    trees = (*(material.node_tree for material in bpy.data.materials if material.node_tree), *bpy.data.node_groups)
+    return any(node.bl_idname == "ShaderNodeScript" for tree in trees for node in tree.nodes)
 
 
 def find_oslquery() -> None:

@@ -18,6 +18,7 @@ from ..domain.parameters import PARAMETERS
 from ..domain.people import class_at
 from ..domain.plan import Plan
 from ..domain.quality import WITHIN
+from ..domain.shading import OSL, not_shown
 from .adopt import SANGUINE_OT_adopt, SANGUINE_OT_remove_skin, skinned_face
 from .animation import (
     SANGUINE_OT_add_feeling,
@@ -44,9 +45,10 @@ from .operators import (
     active_face,
     emotion_bone,
     live_plan,
+    shading_of,
     strange_colours,
 )
-from .osl import missing_osl
+from .osl import renderer_of
 from .plan_view import changed_since, plan_view
 from .presets import (
     SANGUINE_MT_skin_presets,
@@ -154,11 +156,10 @@ class SANGUINE_PT_main(_Part):
             layout.label(text="Changed: apply the skin to see it", icon="INFO")
         if skinned_face(context) is not None:
             layout.operator(SANGUINE_OT_remove_skin.bl_idname, icon="TRASH")
-        if missing_osl():
-            layout.label(text="This Blender has no OSL: no skin", icon="ERROR")
-        elif face and context.scene.render.engine != "CYCLES" and any(m and MARK in m for m in face.data.materials):
-            layout.label(text="Only Cycles shows the skin:", icon="INFO")
-            layout.prop(context.scene.render, "engine", text="")
+        if why := _not_shown(context.scene, face):
+            layout.label(text=why.rstrip(":"), icon="INFO")
+            if why.endswith(":"):
+                layout.prop(context.scene.render, "engine", text="")
         if face and (why := newer(face)):
             _wrapped(layout, context, why, "ERROR")
             return
@@ -254,6 +255,13 @@ def _sliders(layout: bpy.types.UILayout, bone: bpy.types.PoseBone, names: Iterab
     for name in names:
         if name in bone:
             column.prop(bone, f'["{name}"]', text=_slider_label(bone, name), slider=True)
+
+
+def _not_shown(scene: bpy.types.Scene, face: bpy.types.Object | None) -> str:
+    """Why this Blender, as it is set, does not show the face's skin; "" where it does or there is none."""
+    ours = (material[MARK] for material in face.data.materials if material and MARK in material) if face else ()
+    renderer = renderer_of(scene)
+    return next(filter(None, (not_shown(mark.get("shading", OSL), renderer) for mark in ours)), "")
 
 
 def _slider_label(bone: bpy.types.PoseBone, name: str) -> str:
@@ -399,6 +407,11 @@ class SANGUINE_PT_plan(_Part):
         table = f"{plan.entries} skins in the table: {_time(view.milliseconds)} of one core"
         maps = "no UV map, so no maps" if view.megabytes is None else f"{_megabytes(view.megabytes)} of maps"
         _wrapped(layout, context, f"{table}; {maps}")
+        layout.prop(face.sanguine, "shading")
+        try:
+            _wrapped(layout, context, "Skin is " + shading_of(context.scene, face).line)
+        except ValueError as error:
+            _wrapped(layout, context, str(error), "ERROR")
 
 
 def _switch(row: bpy.types.UILayout, face: bpy.types.Object, effect: Effect) -> None:

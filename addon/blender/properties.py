@@ -12,6 +12,7 @@ from ..domain.parameters import PARAMETERS
 from ..domain.people import AGES, SEEDS, Person
 from ..domain.plan import default_strengths
 from ..domain.quality import BEST_DELTA_E, DEFAULT, PRESETS, WITHIN, Point, Settings, chosen_point
+from ..domain.shading import AUTO, NODES, OSL
 from . import headline
 from .images import measure_range, stored_range
 from .swatch import swatch_of
@@ -77,7 +78,30 @@ def _skin_properties() -> dict[str, object]:
         "file's working space",
         subtype="COLOR", size=3, min=0.0, max=1.0, get=_skin_colour, options=set(),
     )
+    made["shading"] = bpy.props.EnumProperty(
+        name="Material",
+        description="What the skin's material is made of when it is applied: the same skin either way",
+        items=[
+            (AUTO, "Automatic", "OSL where this Blender's Cycles runs it on the scene's device, else plain nodes"),
+            (OSL, "OSL", "Two or three short scripts that a person can read. Cycles alone shows them, on the CPU and OptiX"),
+            (NODES, "Plain Nodes", "What the scripts compute, as Blender's own nodes: every device, EEVEE, every Blender"),
+        ],
+        default=AUTO,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     return made | headline.properties()
+    made["shading"] = bpy.props.EnumProperty(
+        name="Material",
+        description="What the skin's material is made of when it is applied: the same skin either way",
+        items=[
+            (AUTO, "Automatic", "OSL where this Blender's Cycles runs it on the scene's device, else plain nodes"),
+            (OSL, "OSL", "Two or three short scripts that a person can read. Cycles alone shows them, on the CPU and OptiX"),
+            (NODES, "Plain Nodes", "What the scripts compute, as Blender's own nodes: every device, EEVEE, every Blender"),
+        ],
+        default=AUTO,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    return made
 
 
 def _growth_properties() -> dict[str, object]:

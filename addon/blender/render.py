@@ -106,7 +106,7 @@ def set_image(scene: bpy.types.Scene, image: Image, samples: int) -> None:
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y, render.resolution_percentage = image.width, image.height, 100
     cycles.device = "CPU"
-    cycles.shading_system = True  # OSL
+    cycles.shading_system = False  # a skin of OSL sets it
     cycles.samples = samples
     cycles.seed = image.seed
     cycles.use_denoising = image.denoise

@@ -13,7 +13,7 @@ from .blood import blood_properties
 from .colour import follow_working_space, strange_images
 from .migration import newer
 from .operators import controls_of, emotion_bone
-from .osl import missing_osl
+from .osl import has_scripts, missing_osl
 from .render import quiet, save_render
 
 
@@ -74,8 +74,8 @@ class SceneFile:
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, relative_remap=True, check_existing=False)
 
     def render(self, frame: int, png: Path, exr: Path) -> None:
-        if self.scene.render.engine == "CYCLES" and (why := missing_osl()) and self._faces():
-            raise InputError(f"{self.path}: {why}")
+        if self.scene.render.engine == "CYCLES" and has_scripts() and (why := missing_osl()) and self._faces():
+            raise InputError(f"{self.path}: its skin is made of OSL, and {why}: apply it with shading NODES")
         with quiet():
             self.scene.frame_set(frame)
             bpy.ops.render.render(scene=self.scene.name)

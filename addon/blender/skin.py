@@ -14,13 +14,14 @@ from ..domain.errors import InputError
 from ..domain.lut import bake
 from ..domain.migration import SCHEMA, check_version
 from ..domain.plan import Plan
+from ..domain.shading import AUTO, OSL, choose
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
 from .bake import clear_bake
 from .blood import drive_settled, remove_blood
 from .colour import working_space
 from .material import MARK, Map, build_skin_material, number_free, remove_skin_material
-from .osl import missing_osl
+from .osl import renderer_of
 from .properties import images_of
 from .strain import drive_components, remove_components
 from .surface import pixel_mm, read_surface, store_rest
@@ -37,12 +38,14 @@ def apply_skin(
     slot: int = 0,
     progress: Progress | None = None,
     given: Mapping[str, Map] | None = None,
+    shading: str = AUTO,
 ) -> bpy.types.Material:
     """Builds the skin of `plan`, puts it into a material slot of `face` and drives its blood from `armature`.
 
-    given: the maps that came with the face, by id; left out, those that its properties point to.
+    given: the maps that came with the face, by id; left out, those that its properties point to. shading: of
+    `domain.shading`, what the material is made of.
     """
-    return run_tasks(skin_tasks(face, armature, plan, slot, given), progress)
+    return run_tasks(skin_tasks(face, armature, plan, slot, given, shading), progress)
 
 
 def skin_tasks(
@@ -51,15 +54,15 @@ def skin_tasks(
     plan: Plan,
     slot: int = 0,
     given: Mapping[str, Map] | None = None,
+    shading: str = AUTO,
 ) -> Tasks:
     """`apply_skin` in steps: computing is yielded as tasks. Returns the material.
 
     The skin that was there goes when the new one stands, and stays where that fails.
     """
-    if why := missing_osl():
-        raise InputError(f"{face.name}: {why}")
     if VERSION in face:
         check_version(face[VERSION], face.name)
+    chosen = choose(shading, renderer_of(bpy.context.scene))
     surface = read_surface(face) if plan.maps else None
     maps: dict[str, Map] = {}
     if surface:
@@ -77,7 +80,7 @@ def skin_tasks(
             coefficients = yield Task("Following shape keys", lambda _progress, solve=solve: solve(surface))
             components.append((images, coefficients, one_sided))
     before = face.material_slots[slot].material if face.material_slots else None
-    material = build_skin_material(f"{face.name} skin", plan, maps, table)
+    material = build_skin_material(f"{face.name} skin", plan, maps, table, chosen.shading)
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
     if "rest_mm" in inputs:
         store_rest(face)
@@ -102,6 +105,8 @@ def skin_tasks(
     if before is not None and MARK in before and not before.users:
         remove_skin_material(before)
         number_free(material)
+    if chosen.shading == OSL:
+        bpy.context.scene.cycles.shading_system = True
     face[VERSION] = SCHEMA
     return material
 

@@ -65,17 +65,28 @@ def test_every_unit_of_the_rig_has_its_sliders(addon):
     }
 
 
-def test_a_blender_without_osl_refuses_before_it_changes_anything(addon, monkeypatch):
+def test_a_blender_without_osl_makes_plain_nodes_and_refuses_osl_before_it_changes_anything(addon, monkeypatch):
     import _cycles
 
-    monkeypatch.setattr(_cycles, "with_osl", False)
+    bpy.context.scene.render.engine = "CYCLES"
     face = grid()
+    face.sanguine.shading = "OSL"
+    bpy.ops.sanguine.apply_skin()
+    assert "engine" not in draw(panels.SANGUINE_PT_main)
+    monkeypatch.setattr(_cycles, "with_osl", False)
+    assert any("is OSL" in line for line in draw(panels.SANGUINE_PT_main))
     before = {name: len(getattr(bpy.data, name)) for name in ("objects", "materials", "node_groups", "texts", "images")}
     with pytest.raises(RuntimeError, match="built without OSL"):
         bpy.ops.sanguine.apply_skin()
     with pytest.raises(InputError, match="built without OSL"):
-        skin.apply_skin(face, None, operators.live_plan(face))
+        skin.apply_skin(face, None, operators.live_plan(face), shading="OSL")
     assert before == {name: len(getattr(bpy.data, name)) for name in before}
+    face.sanguine.shading = "AUTO"
+    bpy.ops.sanguine.apply_skin()
+    assert face.material_slots[0].material["sanguine"]["shading"] == "NODES"
+    assert not bpy.data.texts, "the scripts went with the skin before"
+    bpy.context.scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+    assert "engine" not in draw(panels.SANGUINE_PT_main)
 
 
 def test_the_panel_says_when_the_engine_does_not_show_the_skin(addon):

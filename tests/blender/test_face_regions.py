@@ -104,7 +104,7 @@ def test_the_button_finds_them_too(part, monkeypatch):
     sanguine.register()
     try:
         plans = []
-        monkeypatch.setattr(operators, "apply_skin", lambda face, rig, plan, slot: plans.append(plan) or {MARK: {"entries": 0}})
+        monkeypatch.setattr(operators, "apply_skin", lambda face, rig, plan, slot, shading: plans.append(plan) or {MARK: {"entries": 0}})
         assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
         assert "lips" in plans[0].scene.regions and plans[0].decisions["anatomy"].active
         assert f"{GROUP_PREFIX}nose" in face.vertex_groups

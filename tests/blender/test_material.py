@@ -39,7 +39,7 @@ def nodes(material):
 def test_what_is_not_called_for_is_nowhere(face):
     plan = make_plan(scene(strengths={"anatomy": 0.0}, oil=0.0))
     sanguine_core.reset_counters()
-    material = apply_skin(face, None, plan)
+    material = apply_skin(face, None, plan, shading="OSL")
     counted = sanguine_core.counters()
     assert counted["lobe_fits"] == 3, "one skin, three channels"
     assert counted["texels_rasterized"] == 0

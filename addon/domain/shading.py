@@ -1,0 +1,68 @@
+"""What a skin's material is made of: OSL scripts, or the plain nodes that they compile to; and which of the two serves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .errors import InputError, nearest
+
+AUTO, OSL, NODES = "AUTO", "OSL", "NODES"
+SHADINGS = (AUTO, OSL, NODES)
+
+CYCLES = "CYCLES"
+# Engines that draw a material's nodes; EEVEE has had two names.
+_DRAW_NODES = (CYCLES, "BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
+# Devices of Cycles that run OSL, as its preferences name them.
+_RUN_OSL = ("CPU", "OPTIX")
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """Facts about a Blender. engine: as the scene names it. no_osl: why its Cycles runs no OSL, "" where it does.
+    device: "CPU", or the kind of GPU that the scene is rendered on."""
+
+    engine: str = CYCLES
+    no_osl: str = ""
+    device: str = "CPU"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """OSL or NODES, and why."""
+
+    shading: str
+    because: str
+
+    @property
+    def line(self) -> str:
+        return f"made of {'OSL' if self.shading == OSL else 'plain nodes'}: {self.because}"
+
+
+def choose(wanted: str, renderer: Renderer) -> Choice:
+    """Raises InputError where OSL is wanted and cannot be."""
+    if wanted not in SHADINGS:
+        raise InputError(f"material: no such kind '{wanted}', {nearest(wanted, SHADINGS)}")
+    if wanted == OSL and renderer.no_osl:
+        raise InputError(f"material is OSL, but {renderer.no_osl}; AUTO and NODES work here")
+    if wanted != AUTO:
+        return Choice(wanted, "asked for")
+    if renderer.no_osl:
+        return Choice(NODES, renderer.no_osl)
+    if renderer.engine != CYCLES:
+        return Choice(NODES, f"{renderer.engine} runs no OSL")
+    if renderer.device not in _RUN_OSL:
+        return Choice(NODES, f"Cycles runs no OSL on {renderer.device}")
+    return Choice(OSL, f"Cycles runs OSL on {renderer.device}")
+
+
+def not_shown(shading: str, renderer: Renderer) -> str:
+    """Why this Blender does not show a skin of this kind, a line for people, "" where it does."""
+    if shading == NODES:
+        return "" if renderer.engine in _DRAW_NODES else "Only Cycles and EEVEE show the skin:"
+    if renderer.engine != CYCLES:
+        return "Only Cycles shows a skin of OSL:"
+    if renderer.no_osl:
+        return "The skin is OSL, not to be had here: apply it again"
+    if renderer.device not in _RUN_OSL:
+        return f"No OSL on {renderer.device}: apply the skin as plain nodes"
+    return ""
