@@ -68,6 +68,10 @@ _MATERIAL = {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_cont
 _SIDEBAR_ID, _MATERIAL_ID = "SANGUINE_PT_", "SANGUINE_PT_material_"
 
 
+_BESIDE = 32
+"""Letters of a name and its reason that find room side by side."""
+
+
 class _Part:
     """What a panel draws. parent: the id of the panel that it is in."""
 
@@ -225,7 +229,7 @@ def _swatch(layout: bpy.types.UILayout, face: bpy.types.Object) -> None:
     numbers.label(text="L* {:.0f}  a* {:.0f}  b* {:.0f}".format(*shown.lab))
     numbers.label(text=f"ITA {shown.ita:.0f}\N{DEGREE SIGN}, {class_at(shown.ita).replace('-', ' ')}")
     numbers.label(text="400 to 700 nm, to 80 %")
-    row.template_icon(spectrum_icon(skin), scale=5.0)
+    row.template_icon(spectrum_icon(skin), scale=6.5)
     if skin_map.MAP in images_of(face) and getattr(face.sanguine, switch_property(skin_map.MAP)):
         layout.label(text="A skin map stands in its place", icon="INFO")
 
@@ -391,6 +395,7 @@ class SANGUINE_PT_plan(_Part):
         if plan is None:
             return
         view = plan_view(face, context.scene, plan)
+        layout.label(text="Time to solve, memory of maps")
         for effect in EFFECTS:
             decision = plan.decisions[effect.id]
             if not decision.active and effect.id not in plan.scene.switched_off:
@@ -434,8 +439,14 @@ class SANGUINE_PT_idle(_Part):
             decision = plan.decisions[effect.id]
             if not decision.active and effect.id not in plan.scene.switched_off:
                 column = self.layout.column(align=True)
-                _switch(column, face, effect)
-                _wrapped(column, context, decision.because, "BLANK1")
+                row = column.row(align=True)
+                _switch(row, face, effect)
+                if len(effect.label) + len(decision.because) <= _BESIDE:
+                    right = row.row()
+                    right.alignment = "RIGHT"
+                    right.label(text=decision.because)
+                else:
+                    _wrapped(column, context, decision.because, "BLANK1")
 
 
 def _time(milliseconds: float) -> str:

@@ -75,8 +75,9 @@ def _skin_properties() -> dict[str, object]:
     made["skin_colour"] = bpy.props.FloatVectorProperty(
         name="Skin Colour",
         description="The skin as the sliders stand, at rest, in diffuse daylight (D65), without highlights: linear, in the "
-        "file's working space",
-        subtype="COLOR", size=3, min=0.0, max=1.0, get=_skin_colour, options=set(),
+        "file's working space. To look at, or to copy: the sliders change it",
+        # What cannot be set is drawn paler, which is another colour.
+        subtype="COLOR", size=3, min=0.0, max=1.0, get=_skin_colour, set=lambda _settings, _value: None, options=set(),
     )
     made["shading"] = bpy.props.EnumProperty(
         name="Material",

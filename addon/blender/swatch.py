@@ -44,6 +44,7 @@ def spectrum_icon(skin: Skin) -> int:
         name = f"spectrum {len(_pictures)}" if len(_pictures) < _KEPT else _pictures.popitem(last=False)[1]
         preview = _previews.get(name) or _previews.new(name)
         pixels = swatch.plot(swatch_of(skin).reflectance)
+        pixels[..., :3] *= pixels[..., 3:]  # as Blender draws its icons
         preview.image_size = pixels.shape[1::-1]
         preview.image_pixels_float = pixels.ravel()
         _pictures[key] = name

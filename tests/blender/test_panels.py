@@ -485,6 +485,8 @@ def test_the_swatch_is_the_colour_that_sanguine_skin_says(face):
 
 def test_the_swatch_follows_the_sliders_and_keeps_what_it_knows(face, monkeypatch):
     before = list(face.sanguine.skin_colour)
+    face.sanguine.skin_colour = (1.0, 0.0, 0.0)
+    assert list(face.sanguine.skin_colour) == before, "it is there to be looked at"
     face.sanguine.melanin = 0.3
     assert max(face.sanguine.skin_colour) < min(before), "far darker"
     swatch.spectrum_icon(skin_of(face))
@@ -506,8 +508,9 @@ def test_many_skins_take_no_more_room_than_a_few(face):
     assert len(swatch._previews) == len(swatch._pictures) == len(swatch._known) == 16
     assert not np.array_equal(shown[0], shown[39]), "a place that is used again shows the new spectrum"
     # Bytes: 1/255, rounded.
-    again = colours.plot(swatch.swatch_of(skin_of(face)).reflectance).ravel()
-    assert np.abs(shown[39] - again).max() < 0.51 / 255 + 1e-6
+    again = colours.plot(swatch.swatch_of(skin_of(face)).reflectance)
+    again[..., :3] *= again[..., 3:]
+    assert np.abs(shown[39] - again.ravel()).max() < 0.51 / 255 + 1e-6
 
 
 def test_the_plot_is_the_spectrum():
