@@ -81,4 +81,5 @@ EFFECT = Effect(
     activate=lambda scene: strength_activation(scene, "thin"),
     fragments=_fragments,
     default_strength=0.0,
+    group="structure",
 )
