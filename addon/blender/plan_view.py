@@ -14,6 +14,7 @@ import bpy
 from ..app.costs import EffectCost, effect_costs, entry_ms, map_costs
 from ..domain.errors import InputError
 from ..domain.plan import Plan
+from ..domain.shading import AUTO
 from ..domain.texel_density import map_sizes, mm_per_uv
 from .material import MARK
 from .properties import images_of
@@ -79,7 +80,12 @@ def _layout(face: bpy.types.Object) -> tuple[float, int] | None:
 
 
 def changed_since(face: bpy.types.Object, plan: Plan) -> bool:
-    """Whether the face's material was made from something else than `plan`. Of one that does not say: no."""
+    """Whether the face's material was made from something else than `plan`, or of other nodes than are asked for. Of one
+    that does not say: no."""
     slot = our_slot(face)
-    made = face.material_slots[slot].material[MARK].get("fingerprint") if slot is not None else None
-    return made is not None and made != plan.fingerprint
+    if slot is None:
+        return False
+    mark, wanted = face.material_slots[slot].material[MARK], face.sanguine.shading
+    if wanted != AUTO and mark.get("shading", wanted) != wanted:
+        return True
+    return mark.get("fingerprint", plan.fingerprint) != plan.fingerprint

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import bpy
 
@@ -15,7 +16,12 @@ from ..domain.quality import BEST_DELTA_E, DEFAULT, PRESETS, WITHIN, Point, Sett
 from ..domain.shading import AUTO, NODES, OSL
 from . import headline
 from .images import measure_range, stored_range
+from .material import MARK
 from .swatch import swatch_of
+
+
+# Not animatable: keys would move the number in the panel, and nothing of the skin. What moves in a shot has sliders on the rig.
+_KEPT = {"override": {"LIBRARY_OVERRIDABLE"}, "options": set()}
 
 
 def _skin_properties() -> dict[str, object]:
@@ -32,18 +38,20 @@ def _skin_properties() -> dict[str, object]:
             soft_max=row.soft_max,
             precision=3,
             step=1,
-            override={"LIBRARY_OVERRIDABLE"},
+            update=_follower(row.label, row.id),
+            **_KEPT,
         )
     for effect in EFFECTS:
         if effect.default_strength is not None:
             made[strength_property(effect.id)] = bpy.props.FloatProperty(
                 name=effect.label, description=f"{effect.help.rstrip('.')}. Strength, 0 (costs nothing) to 1",
-                default=effect.default_strength, min=0.0, max=1.0, override={"LIBRARY_OVERRIDABLE"},
+                default=effect.default_strength, min=0.0, max=1.0,
+                update=_follower(effect.label, strength_property(effect.id)), **_KEPT,
             )
         if effect.switchable:
             made[switch_property(effect.id)] = bpy.props.BoolProperty(
                 name=effect.label, description=f"{effect.help.rstrip('.')}. Off, it costs nothing; apply the skin to see it",
-                default=True, override={"LIBRARY_OVERRIDABLE"},
+                default=True, **_KEPT,
             )
     made |= _growth_properties()
     channels = "red {}, green {}, blue {}, alpha {}".format(*skin_map.CHANNELS)
@@ -91,24 +99,11 @@ def _skin_properties() -> dict[str, object]:
         override={"LIBRARY_OVERRIDABLE"},
     )
     return made | headline.properties()
-    made["shading"] = bpy.props.EnumProperty(
-        name="Material",
-        description="What the skin's material is made of when it is applied: the same skin either way",
-        items=[
-            (AUTO, "Automatic", "OSL where this Blender's Cycles runs it on the scene's device, else plain nodes"),
-            (OSL, "OSL", "Two or three short scripts that a person can read. Cycles alone shows them, on the CPU and OptiX"),
-            (NODES, "Plain Nodes", "What the scripts compute, as Blender's own nodes: every device, EEVEE, every Blender"),
-        ],
-        default=AUTO,
-        override={"LIBRARY_OVERRIDABLE"},
-    )
-    return made
 
 
 def _growth_properties() -> dict[str, object]:
     """Who grows the features: the fields of `Growth`."""
-    common = {"override": {"LIBRARY_OVERRIDABLE"}}
-    default = Growth()
+    common, default = _KEPT, Growth()
     return {
         "seed": bpy.props.IntProperty(
             name="Individual", description="Number of the individual: where freckles, moles and vessels lie",
@@ -144,6 +139,24 @@ def set_person(obj: bpy.types.Object, person: Person) -> None:
 
 def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     context.scene.cycles.samples = chosen_point(settings.quality, settings.delta_e).samples
+
+
+def _follower(label: str, name: str) -> Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]:
+    """What hands a value that somebody sets on to the slider of this label in the face's material, if it has one.
+
+    A material that another object shows too is left alone until the skin is applied, which gives each face its own.
+    """
+
+    def follow(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+        for slot in settings.id_data.material_slots:
+            material = slot.material
+            if material is None or MARK not in material or material.library or material.users - material.use_fake_user > 1:
+                continue
+            for node in material.node_tree.nodes:
+                if node.bl_idname == "ShaderNodeGroup" and label in node.inputs:
+                    node.inputs[label].default_value = getattr(settings, name)
+
+    return follow
 
 
 def _skin_colour(settings: bpy.types.PropertyGroup) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 
-from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering, thin
+from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering, skin_map, thin
 from .errors import InputError, nearest
 from .parameters import PARAMETERS, Skin
 from .quality import DEFAULT, Settings, preset
@@ -80,18 +80,30 @@ class Plan:
         return make_plan(replace(self.scene, switched_off=self.scene.switched_off | {effect_id}), self.settings)
 
     @property
+    def sliders(self) -> frozenset[str]:
+        """Parameters that a material of this plan has sliders for: they act at once, as far as the table reaches."""
+        inputs = [item for fragment in self.fragments for item in fragment.inputs]
+        named = {item.key for item in inputs if item.source == "parameter"} | {axis.id for axis in self.axes}
+        if any(item.source == "chromophores" and item.key == "film" for item in inputs):
+            named.add("oil")
+        return frozenset(named - set(skin_map.held(self.scene)))
+
+    @property
     def fingerprint(self) -> str:
-        """Changes with whatever a material of this plan was made from; samples, which no material holds, apart. What the
-        painted features were found to reach follows from the rest."""
-        scene = self.scene
+        """Changes with whatever a material of this plan was made from and cannot follow by a slider; samples, which no
+        material holds, apart. What the painted features were found to reach follows from the rest."""
+        maps = {name: held for name, held in self.scene.maps.items() if grown.channels_of(name) is None}
+        plan = self if len(maps) == len(self.scene.maps) else make_plan(replace(self.scene, maps=maps), self.settings)
+        scene = plan.scene
         what = {
-            "skin": scene.skin,
+            "skin": {name: value for name, value in plan.skin.items() if name not in plan.sliders},
+            "axes": [asdict(axis) for axis in plan.axes],
             "frames": [(f.id, f.emotions, f.blood, sorted((f.changes or {}).items()), f.moves) for f in scene.frames],
             "strengths": {name: value for name, value in scene.strengths.items() if value},
             "active": [effect.id for effect in self.active],
             "regions": scene.regions,
             "growth": asdict(scene.growth),
-            "maps": {name: held for name, held in scene.maps.items() if grown.channels_of(name) is None},
+            "maps": maps,
             "given": (scene.live, scene.shape_keys, scene.pressure, scene.presses),
             "quality": self.settings.model_dump(exclude={"samples"}),
         }

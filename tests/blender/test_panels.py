@@ -306,6 +306,50 @@ def test_a_redraw_is_quick(face):
         assert seconds(lambda panel=panel: draw(panel)) < limit, panel.__name__
 
 
+def test_skin_sliders_act_at_once_and_ask_for_no_apply(face):
+    group = next(n for n in face.material_slots[0].material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
+    mine = {PARAMETERS[name].label for name in live_plan(face).sliders}
+    assert mine == {socket.name for socket in group.inputs} - {e.label for e in EFFECTS if e.default_strength is not None}
+    for name in live_plan(face).sliders:
+        row = PARAMETERS[name]
+        value = 0.5 * (row.soft_min + row.soft_max)
+        setattr(face.sanguine, name, value)
+        assert group.inputs[row.label].default_value == pytest.approx(value)
+    hint = "Changed: apply the skin to see it"
+    assert hint not in draw(panels.SANGUINE_PT_main)
+    face.sanguine.melanin = 0.001  # beyond the table
+    assert hint in draw(panels.SANGUINE_PT_main)
+    face.sanguine.melanin = 0.02
+    assert hint not in draw(panels.SANGUINE_PT_main)
+    face.sanguine.epidermis_thickness_mm = 0.2  # no axis
+    assert hint in draw(panels.SANGUINE_PT_main)
+
+
+def test_a_slider_moves_its_own_face_alone(face):
+    other = face.copy()  # shows the same material
+    bpy.context.collection.objects.link(other)
+    group = next(n for n in face.material_slots[0].material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
+    other.data = face.data.copy()
+    before = group.inputs["Melanin"].default_value
+    other.sanguine.melanin = 0.3
+    assert group.inputs["Melanin"].default_value == before
+
+
+def test_other_nodes_are_a_change_only_when_asked_for(face):
+    hint = "Changed: apply the skin to see it"
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    assert hint not in draw(panels.SANGUINE_PT_main)
+    made = face.material_slots[0].material[MARK]["shading"]
+    face.sanguine.shading = "NODES" if made == "OSL" else "OSL"
+    assert hint in draw(panels.SANGUINE_PT_main)
+
+
+def test_numbers_that_move_nothing_by_themselves_cannot_be_keyed(face):
+    for name in (*PARAMETERS, "strength_mottle", "use_oil", "seed"):
+        with pytest.raises(TypeError, match="not animatable"):
+            face.sanguine.keyframe_insert(name)
+
+
 # ---- quality
 
 
