@@ -10,6 +10,7 @@ from ..domain.effects import EFFECTS
 from ..domain.framing import Framing, portrait
 from ..domain.plan import Plan, make_plan
 from ..domain.quality import Choice
+from ..domain.shading import Renderer, choose
 from ..domain.shot import Shot, Subject, scene_of
 from ..domain.texel_density import map_sizes, mm_per_uv
 from .costs import effect_costs, map_costs
@@ -36,9 +37,13 @@ def example_face(shot: Shot) -> FaceOf:
 
 
 def plan_report(
-    shot: Shot, regions: tuple[str, ...], quality: Choice | None = None, face_of: FaceOf | None = None
+    shot: Shot,
+    regions: tuple[str, ...],
+    quality: Choice | None = None,
+    face_of: FaceOf | None = None,
+    renderer: Renderer = Renderer(),
 ) -> dict[str, Any]:
-    """The answer of `sanguine plan`: one plan per subject, the first one's at the top level too.
+    """The answer of `sanguine plan`: one plan per subject, the first one's at the top level too. renderer: what will render.
 
     `costs_ms` is what an effect adds to the preparation of this shot on this machine: the table entries that
     would not be there without it, at the time that an entry takes.
@@ -51,7 +56,13 @@ def plan_report(
     reports = {name: _report(plan) for name, plan in plans.items()}
     for subject in shot.subjects if face_of else ():
         reports[subject.id]["maps"] = _maps(plans[subject.id], shot, *face_of(subject))
-    answer = {"sanguine": sanguine_core.__version__, "quality": _quality(shot, quality), **next(iter(reports.values()))}
+    material = choose(shot.image.material.upper(), renderer)
+    answer = {
+        "sanguine": sanguine_core.__version__,
+        "quality": _quality(shot, quality),
+        "material": {"shading": material.shading.lower(), "because": material.because},
+        **next(iter(reports.values())),
+    }
     if len(reports) > 1:
         answer["subjects"] = reports
     return answer

@@ -75,7 +75,7 @@ def build_skin_material(
 
 def remove_skin_material(material: bpy.types.Material) -> None:
     """Removes a material of `build_skin_material` with the group, images and texts that were made for it alone."""
-    groups = _groups(material)
+    groups = groups_of(material)
     bpy.data.materials.remove(material)
     for group in groups:
         parts = set(_parts(group))
@@ -90,13 +90,14 @@ def remove_skin_material(material: bpy.types.Material) -> None:
 
 def number_free(material: bpy.types.Material) -> None:
     """Takes off the numbers (".001") that Blender put behind names while the skin before this one still had them."""
-    for group in _groups(material):
+    for group in groups_of(material):
         for item in (material, group, *_parts(group)):
             if _NUMBERED.search(item.name):
                 item.name = _NUMBERED.sub("", item.name)  # a name that is taken gets a number again
 
 
-def _groups(material: bpy.types.Material) -> list[bpy.types.NodeTree]:
+def groups_of(material: bpy.types.Material) -> list[bpy.types.NodeTree]:
+    """The skin's group, of which every material of ours has one."""
     nodes = material.node_tree.nodes if material.node_tree else ()
     return [node.node_tree for node in nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
 

@@ -49,6 +49,7 @@ from .operators import (
     strange_colours,
 )
 from .osl import renderer_of
+from .plain import SANGUINE_OT_bake_plain
 from .plan_view import changed_since, plan_view
 from .presets import (
     SANGUINE_MT_skin_presets,
@@ -413,6 +414,7 @@ class SANGUINE_PT_plan(_Part):
         maps = "no UV map, so no maps" if view.megabytes is None else f"{_megabytes(view.megabytes)} of maps"
         _wrapped(layout, context, f"{table}; {maps}")
         layout.prop(face.sanguine, "shading")
+        layout.operator(SANGUINE_OT_bake_plain.bl_idname, icon="NODE_MATERIAL")
         try:
             _wrapped(layout, context, "Skin is " + shading_of(context.scene, face).line)
         except ValueError as error:

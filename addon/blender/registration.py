@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from . import adopt, animation, capture, example, operators, panels, presets, properties, swatch
+from . import adopt, animation, capture, example, operators, panels, plain, presets, properties, swatch
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *adopt.CLASSES, *example.CLASSES, *animation.CLASSES, *capture.CLASSES, *presets.CLASSES, *panels.CLASSES)
+_MODULES = (properties, operators, adopt, example, animation, capture, plain, presets, panels)
+_CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
 _commands: list[object] = []
 
 

@@ -56,7 +56,7 @@ class BlenderRenderer:
             )
             set_image(scene, shot.image, plan.settings.samples)
             set_profile(face.rig, shot.profile)
-            apply_skin(face.skin, face.rig, plan, given=images)
+            apply_skin(face.skin, face.rig, plan, given=images, shading=shot.image.material.upper())
             played = performance(shot)
             if played is not None:
                 scene.frame_start, scene.frame_end = shot.timeline.first, shot.timeline.last

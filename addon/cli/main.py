@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from ..domain.errors import InputError
+from ..domain.shading import Renderer
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -458,8 +459,17 @@ def _plan(options: argparse.Namespace) -> int:
 
     quality = choice(options.quality, options.delta_e)
     shot = read_shot(options.shot)
-    _answer(plan_report(shot, FACE_REGIONS, quality, example_face(shot)), options.out)
+    _answer(plan_report(shot, FACE_REGIONS, quality, example_face(shot), _renderer()), options.out)
     return 0
+
+
+def _renderer() -> Renderer:
+    """What would render here: the Blender that runs this, else one of blender.org."""
+    if "bpy" not in sys.modules:
+        return Renderer()
+    from ..blender.osl import missing_osl
+
+    return Renderer(no_osl=missing_osl())
 
 
 def _render(options: argparse.Namespace) -> int:

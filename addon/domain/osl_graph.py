@@ -702,7 +702,7 @@ class _Run:
         if name in _CLOSURES:
             return self.closure(name, args)
         if any(not isinstance(arg, Op) for arg in args):
-            raise self.unknown(f"{name} of these arguments")
+            raise self.unknown(f"{name}({', '.join(repr(arg) for arg in args if isinstance(arg, str))})")
         kind = _CALLS.get(name, name if name in ("mix", "smoothstep", "dot", "cross", "length", "normalize") else None)
         if kind is None:
             raise self.unknown(f"{name}()")

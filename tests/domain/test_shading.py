@@ -1,0 +1,62 @@
+"""What a skin is made of where: a rule of facts, with its reason."""
+
+import pytest
+from sanguine.app.planning import plan_report
+from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.errors import InputError
+from sanguine.domain.shading import AUTO, NODES, OSL, Renderer, choose, not_shown
+from sanguine.domain.shot import read_shot
+
+DEBIAN = "the Cycles of this Blender was built without OSL"
+SHOT = '[rig]\nhead = "female"\n[image]\n{}\n[[expression]]\nid = "a"\n'
+
+
+@pytest.mark.parametrize(("renderer", "shading", "because"), [
+    (Renderer(), OSL, "CPU"),
+    (Renderer(device="OPTIX"), OSL, "OPTIX"),
+    *((Renderer(device=device), NODES, device) for device in ("CUDA", "HIP", "METAL", "ONEAPI")),
+    (Renderer("BLENDER_EEVEE_NEXT"), NODES, "BLENDER_EEVEE_NEXT"),
+    (Renderer(no_osl=DEBIAN), NODES, "without OSL"),
+])
+def test_automatic_is_what_renders_here(renderer, shading, because):
+    choice = choose(AUTO, renderer)
+    assert choice.shading == shading and because in choice.because
+    assert because in choice.line
+    assert not_shown(choice.shading, renderer) == "", "what it chooses is shown"
+
+
+def test_asked_for_is_asked_for():
+    assert choose(NODES, Renderer()).shading == NODES
+    assert choose(OSL, Renderer("BLENDER_EEVEE")).shading == OSL, "an artist may look at it in Cycles later"
+    with pytest.raises(InputError, match="material is OSL, but the Cycles of this Blender was built without OSL"):
+        choose(OSL, Renderer(no_osl=DEBIAN))
+    with pytest.raises(InputError, match="no such kind 'GLSL'"):
+        choose("GLSL", Renderer())
+
+
+@pytest.mark.parametrize(("shading", "renderer", "says"), [
+    (OSL, Renderer("BLENDER_EEVEE"), "Only Cycles"),
+    (OSL, Renderer(no_osl=DEBIAN), "apply it again"),
+    (OSL, Renderer(device="HIP"), "No OSL on HIP"),
+    (NODES, Renderer("BLENDER_WORKBENCH"), "Only Cycles and EEVEE"),
+    (NODES, Renderer("BLENDER_EEVEE"), ""),
+    (NODES, Renderer(no_osl=DEBIAN, device="HIP"), ""),
+])
+def test_the_panel_knows_what_is_not_shown(shading, renderer, says):
+    said = not_shown(shading, renderer)
+    assert says in said and bool(says) == bool(said)
+
+
+def test_a_shot_names_its_material_and_the_plan_says_why(tmp_path):
+    path = tmp_path / "shot.toml"
+    for text, expected in (("", "osl"), ('material = "nodes"', "nodes"), ('material = "osl"', "osl")):
+        path.write_text(SHOT.format(text))
+        said = plan_report(read_shot(path), FACE_REGIONS)["material"]
+        assert said["shading"] == expected and said["because"]
+    path.write_text(SHOT.format(""))
+    assert plan_report(read_shot(path), FACE_REGIONS, renderer=Renderer(no_osl=DEBIAN))["material"] == {
+        "shading": "nodes", "because": DEBIAN,
+    }
+    path.write_text(SHOT.format('material = "glsl"'))
+    with pytest.raises(InputError, match="image.material"):
+        read_shot(path)
