@@ -27,6 +27,7 @@ from .plan import check_strengths, check_switches, default_strengths
 from .profile import Profile, read_profile, with_profile
 from .quality import DEFAULT, Choice, preset
 from .resources import rigs_path
+from .skin_preset import SkinPreset, read_preset
 from .udim import find_tiles
 from .vascular import HEART_RATE, HEART_RATE_AT_REST, Controls, blood_over_time
 
@@ -107,22 +108,32 @@ class Subject(_Table):
     id: Id
     rig: Rig
     person: Individual | None = None
+    # A file of Export Skin, in the place of a person; its path is relative to the shot's. Its quality is not the shot's.
+    skin_preset: str | None = None
     skin: dict[str, float] = {}
     maps: Maps = Maps()
 
+    @cached_property
+    def preset(self) -> SkinPreset | None:
+        return read_preset(self.skin_preset) if self.skin_preset is not None else None
+
     def whole_skin(self, where: str = "skin") -> dict[str, float]:
-        """Every parameter: what `skin` names, else the person's, else the schema's default. Raises InputError."""
-        return skin_from(self.skin, where, self.person.person.skin if self.person else None)
+        """Every parameter: what `skin` names, else the person's or the preset's, else the schema's default. Raises
+        InputError."""
+        base = self.person.person.skin if self.person else self.preset.skin if self.preset else None
+        return skin_from(self.skin, where, base)
 
     def strengths(self, effects: Mapping[str, bool | float], where: str = "effects") -> dict[str, float]:
-        """Of every effect: what the shot's `effects` names, else the person's, else the default. Raises InputError."""
+        """Of every effect: what the shot's `effects` names, else the person's or the preset's, else the default. Raises
+        InputError."""
         known = default_strengths()
         given = {name: float(value) for name, value in effects.items() if not isinstance(value, bool) or value and name in known}
-        return check_strengths(given, where, self.person.person.strengths if self.person else None)
+        base = self.person.person.strengths if self.person else self.preset.effects if self.preset else None
+        return check_strengths(given, where, base)
 
     @property
     def growth(self) -> Growth:
-        return self.person.person.growth if self.person else Growth()
+        return self.person.person.growth if self.person else self.preset.grown if self.preset else Growth()
 
 
 # Table of a pose -> what it names, for people, and the names that there are.
@@ -224,6 +235,7 @@ class Shot(_Table):
 
     rig: Rig | None = None
     person: Individual | None = None
+    skin_preset: str | None = None
     skin: dict[str, float] = {}
     maps: Maps = Maps()
     # Effect -> its strength, or false: switched off (true: as without this line, at full strength if it has one).
@@ -270,7 +282,8 @@ class Shot(_Table):
         if self.subject:
             return self.subject
         assert self.rig is not None  # read_shot saw to it
-        return [Subject(id="subject", rig=self.rig, person=self.person, skin=self.skin, maps=self.maps)]
+        shared = {name: getattr(self, name) for name in ("rig", "person", "skin_preset", "skin", "maps")}
+        return [Subject(id="subject", **shared)]
 
 
 class Job(_Table):
@@ -290,8 +303,18 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
                          + ("both" if shot.subject else "neither"))
     if shot.subject and shot.person:
         raise InputError(f"{path}: person: give it to the [[subject]] tables, each its own")
+    if shot.subject and shot.skin_preset is not None:
+        raise InputError(f"{path}: skin_preset: give it to the [[subject]] tables, each its own")
     if shot.subject and shot.maps != Maps():
         raise InputError(f"{path}: maps: give them to the [[subject]] tables, each its own")
+    folder = Path(path).resolve().parent
+    shot = shot.model_copy(update={
+        "skin_preset": _beside(folder, shot.skin_preset),
+        "subject": [s.model_copy(update={"skin_preset": _beside(folder, s.skin_preset)}) for s in shot.subject],
+    })
+    for subject in shot.subjects:
+        if subject.person and subject.skin_preset is not None:
+            raise InputError(f"{path}: skin_preset: give a person or a preset, not both")
     if bool(shot.expression) == (shot.timeline is not None):
         raise InputError(f"{path}: expression: give [[expression]] tables or one [timeline], not "
                          + ("both" if shot.expression else "neither"))
@@ -321,10 +344,14 @@ def read_shot(path: str | os.PathLike[str]) -> Shot:
         ],
     }
     if shot.blood_profile is not None:
-        found["blood_profile"] = str(Path(path).resolve().parent / shot.blood_profile)
+        found["blood_profile"] = _beside(folder, shot.blood_profile)
     shot = shot.model_copy(update=found)
     shot.profile  # read now: what is wrong with it is said before any work
     return shot
+
+
+def _beside(folder: Path, name: str | None) -> str | None:
+    return None if name is None else str(folder / name)
 
 
 def _found(maps: Maps, shot_path: str | os.PathLike[str], where: str) -> Maps:

@@ -93,6 +93,28 @@ def test_bad_switches_are_one_line(tmp_path, effects, message):
     assert "\n" not in str(caught.value)
 
 
+def test_a_skin_preset_is_the_base_of_a_shot(tmp_path):
+    (tmp_path / "skin.json").write_text(
+        '{"sanguine_skin": 1, "skin": {"melanin": 0.2, "oil": 0.5}, "effects": {"freckles": 0.3}, "growth": {"seed": 7}}'
+    )
+    path = tmp_path / "shot.toml"
+    path.write_text('skin_preset = "skin.json"\n' + SHOT + "moles = 0.1\n[skin]\noil = 0.9\n")
+    subject = read_shot(path).subjects[0]
+    assert (subject.whole_skin()["melanin"], subject.whole_skin()["oil"], subject.growth.seed) == (0.2, 0.9, 7)
+    assert {k: v for k, v in subject.strengths({"moles": 0.1}).items() if k in ("moles", "freckles")} == {"moles": 0.1, "freckles": 0.3}
+    several = "\n".join(SHOT.splitlines()[2:]) + '\n[[subject]]\nid = "a"\nskin_preset = "skin.json"\nrig.head = "female"\n'
+    path.write_text(several.replace("[effects]", ""))
+    assert read_shot(path).subjects[0].whole_skin()["melanin"] == 0.2
+    for text, message in (
+        ('skin_preset = "none.json"\n' + SHOT, "none.json: no such file"),
+        ('skin_preset = "skin.json"\n' + SHOT + '[person]\ntone = "light"\n', "a person or a preset, not both"),
+        ('skin_preset = "skin.json"\n' + several.replace("[effects]", ""), "each its own"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_shot(path)
+
+
 def test_costs_are_of_what_runs_and_sum_over_maps():
     plan = make_plan(everything())
     sizes = MapSizes(smooth=256, detail=512)
