@@ -17,7 +17,7 @@ from ..domain.facs import ACTION_UNITS, EMOTION_CONTROLS
 from ..domain.parameters import PARAMETERS
 from ..domain.people import class_at
 from ..domain.plan import Plan
-from ..domain.quality import WITHIN
+from ..domain.quality import PRESETS, WITHIN, Point, chosen_point
 from ..domain.shading import OSL, not_shown
 from .adopt import SANGUINE_OT_adopt, SANGUINE_OT_remove_skin, skinned_face
 from .animation import (
@@ -162,7 +162,7 @@ class SANGUINE_PT_main(_Part):
         if skinned_face(context) is not None:
             layout.operator(SANGUINE_OT_remove_skin.bl_idname, icon="TRASH")
         if why := _not_shown(context.scene, face):
-            layout.label(text=why.rstrip(":"), icon="INFO")
+            _wrapped(layout, context, why.rstrip(":"), "INFO")
             if why.endswith(":"):
                 layout.prop(context.scene.render, "engine", text="")
         if face and (why := newer(face)):
@@ -315,7 +315,6 @@ class SANGUINE_PT_features(_Part):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.use_property_split = True
         settings = active_face(context).sanguine
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator(SANGUINE_OT_draw_person.bl_idname, icon="USER")
@@ -383,6 +382,40 @@ class SANGUINE_PT_picture(_Part):
         layout.operator(SANGUINE_OT_read_picture.bl_idname, icon="IMAGE_DATA")
         for name in (skin_map.MAP, residual.MAP):
             layout.prop(active_face(context).sanguine, name)
+
+
+@_panel
+class SANGUINE_PT_quality(_Part):
+    bl_label = "Quality"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Every preset with what was measured of it, to compare before one chooses."""
+        layout, face = self.layout, active_face(context)
+        settings, render = face.sanguine, context.scene.render
+        share = render.resolution_percentage / 100.0
+        width, height = round(share * render.resolution_x), round(share * render.resolution_y)
+        megapixels = width * height / 1e6
+        _wrapped(layout, context, f"Delta E, and seconds of one core for {width} x {height}")
+        column = layout.column(align=True)
+        for name, point in PRESETS.items():
+            _quality_row(column, settings, name, point, megapixels)
+        row = layout.column(align=True)
+        within = chosen_point(WITHIN, settings.delta_e)
+        _quality_row(row, settings, WITHIN, within, megapixels)
+        row.prop(settings, "delta_e", text="Within Delta E")
+        _wrapped(layout, context, point_of(face).means)
+
+
+def _quality_row(
+    column: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str, point: Point, megapixels: float
+) -> None:
+    split = column.split(factor=0.55, align=True)
+    split.prop_enum(settings, "quality", name)
+    split.label(text=f"{point.delta_e:.1f}, {_seconds(point.prepare_seconds + megapixels * point.seconds_per_megapixel)}")
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 600.0 else f"{seconds / 60.0:.0f} min"
 
 
 @_panel

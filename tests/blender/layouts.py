@@ -32,6 +32,10 @@ class Layout:
         data.path_resolve(name)
         self.drawn.append(name)
 
+    def prop_enum(self, data, name, value, **_):
+        assert value in data.bl_rna.properties[name].enum_items
+        self.drawn.append(value)
+
     def label(self, text="", **_):
         self.drawn.append(text)
 
@@ -42,7 +46,7 @@ class Layout:
     def column(self, **_):
         return Layout(self.drawn)
 
-    row = box = column
+    row = box = split = column
 
 
 def draw(panel):

@@ -370,6 +370,18 @@ def test_cheapest_within_is_the_measured_rule(face):
     assert "delta_e" not in draw(panels.SANGUINE_PT_main) and point_of(face) == PRESETS["final"]
 
 
+def test_all_presets_are_shown_with_what_was_measured(face):
+    render = bpy.context.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 2000, 1000, 50
+    drawn = draw(panels.SANGUINE_PT_quality)
+    assert " ".join(drawn[:2]).endswith("1000 x 500")
+    for name, point in PRESETS.items():
+        text = drawn[drawn.index(name) + 1]
+        seconds = point.prepare_seconds + 0.5 * point.seconds_per_megapixel
+        assert text == f"{point.delta_e:.1f}, " + (f"{seconds:.0f} s" if seconds < 600 else f"{seconds / 60:.0f} min")
+    assert WITHIN in drawn and "delta_e" in drawn
+
+
 # ---- presets
 
 
