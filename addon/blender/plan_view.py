@@ -13,11 +13,12 @@ import bpy
 
 from ..app.costs import EffectCost, effect_costs, entry_ms, map_costs
 from ..domain.errors import InputError
+from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shading import AUTO
 from ..domain.texel_density import map_sizes, mm_per_uv
 from .material import MARK
-from .properties import images_of
+from .properties import images_of, is_its_own, slider_of
 from .skin import our_slot
 from .surface import pixel_mm, read_surface
 
@@ -85,7 +86,15 @@ def changed_since(face: bpy.types.Object, plan: Plan) -> bool:
     slot = our_slot(face)
     if slot is None:
         return False
-    mark, wanted = face.material_slots[slot].material[MARK], face.sanguine.shading
-    if wanted != AUTO and mark.get("shading", wanted) != wanted:
+    held = face.material_slots[slot]
+    mark, wanted = held.material[MARK], face.sanguine.shading
+    if mark.get("fingerprint", plan.fingerprint) != plan.fingerprint:
         return True
-    return mark.get("fingerprint", plan.fingerprint) != plan.fingerprint
+    return wanted != AUTO and mark.get("shading", wanted) != wanted or not is_its_own(face, held) and _differs(face, held.material, plan)
+
+
+def _differs(face: bpy.types.Object, material: bpy.types.Material, plan: Plan) -> bool:
+    """Whether the material's sliders are not where the face's are."""
+    rows = [PARAMETERS[name] for name in plan.sliders]
+    sliders = {row.id: slider_of(material, row.label) for row in rows}
+    return any(slider is not None and slider.default_value != getattr(face.sanguine, name) for name, slider in sliders.items())

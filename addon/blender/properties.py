@@ -142,21 +142,30 @@ def _set_samples(settings: bpy.types.PropertyGroup, context: bpy.types.Context) 
 
 
 def _follower(label: str, name: str) -> Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]:
-    """What hands a value that somebody sets on to the slider of this label in the face's material, if it has one.
-
-    A material that another object shows too is left alone until the skin is applied, which gives each face its own.
-    """
+    """What hands a value that somebody sets on to the slider of this label in the face's material, if it has one."""
 
     def follow(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
         for slot in settings.id_data.material_slots:
-            material = slot.material
-            if material is None or MARK not in material or material.library or material.users - material.use_fake_user > 1:
-                continue
-            for node in material.node_tree.nodes:
-                if node.bl_idname == "ShaderNodeGroup" and label in node.inputs:
-                    node.inputs[label].default_value = getattr(settings, name)
+            if slot.material is not None and MARK in slot.material and is_its_own(settings.id_data, slot):
+                if (slider := slider_of(slot.material, label)) is not None:
+                    slider.default_value = getattr(settings, name)
 
     return follow
+
+
+def is_its_own(obj: bpy.types.Object, slot: bpy.types.MaterialSlot) -> bool:
+    """Whether the material of a slot is this object's alone, and the file's. Of one that is shared, each face gets its own
+    when its skin is applied."""
+    shared = [slot.material, *([obj.data] if slot.link == "DATA" else [])]
+    return slot.material.library is None and all(held.users - held.use_fake_user <= 1 for held in shared)
+
+
+def slider_of(material: bpy.types.Material, label: str) -> bpy.types.NodeSocket | None:
+    """The slider of the skin's group that is named so."""
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and label in node.inputs:
+            return node.inputs[label]
+    return None
 
 
 def _skin_colour(settings: bpy.types.PropertyGroup) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from sanguine.blender import panels, plan_view, presets, swatch
 from sanguine.blender.controls import add_controls
 from sanguine.blender.material import MARK
 from sanguine.blender.operators import emotion_bone, live_plan
-from sanguine.blender.properties import VIEWS, point_of, skin_of, switch_property
+from sanguine.blender.properties import VIEWS, point_of, skin_of, slider_of, switch_property
 from sanguine.domain.effects import EFFECTS
 from sanguine.domain.parameters import PARAMETERS
 from sanguine.domain.quality import BEST_DELTA_E, POINTS, PRESETS, WITHIN
@@ -325,14 +325,20 @@ def test_skin_sliders_act_at_once_and_ask_for_no_apply(face):
     assert hint in draw(panels.SANGUINE_PT_main)
 
 
-def test_a_slider_moves_its_own_face_alone(face):
-    other = face.copy()  # shows the same material
+@pytest.mark.parametrize("shared", ["mesh", "material"])
+def test_a_slider_moves_its_own_face_alone(face, shared):
+    other = face.copy()
     bpy.context.collection.objects.link(other)
-    group = next(n for n in face.material_slots[0].material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
-    other.data = face.data.copy()
-    before = group.inputs["Melanin"].default_value
+    if shared == "material":
+        other.data = face.data.copy()
+    melanin = slider_of(face.material_slots[0].material, "Melanin")
+    before = melanin.default_value
     other.sanguine.melanin = 0.3
-    assert group.inputs["Melanin"].default_value == before
+    assert melanin.default_value == before
+    hint = "Changed: apply the skin to see it"
+    assert hint not in draw(panels.SANGUINE_PT_main)
+    bpy.context.view_layer.objects.active = other
+    assert hint in draw(panels.SANGUINE_PT_main), "what cannot follow is said"
 
 
 def test_other_nodes_are_a_change_only_when_asked_for(face):
