@@ -98,13 +98,12 @@ class Plan:
         what = {
             "skin": {name: value for name, value in plan.skin.items() if name not in plan.sliders},
             "axes": [asdict(axis) for axis in plan.axes],
-            "frames": [(f.id, f.emotions, f.blood, sorted((f.changes or {}).items()), f.moves) for f in scene.frames],
+            "fragments": [asdict(fragment) for fragment in plan.fragments],
             "strengths": {name: value for name, value in scene.strengths.items() if value},
-            "active": [effect.id for effect in self.active],
+            "active": [effect.id for effect in plan.active],
             "regions": scene.regions,
             "growth": asdict(scene.growth),
             "maps": maps,
-            "given": (scene.live, scene.shape_keys, scene.pressure, scene.presses),
             "quality": self.settings.model_dump(exclude={"samples"}),
         }
         return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:16]

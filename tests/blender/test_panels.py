@@ -341,6 +341,17 @@ def test_a_slider_moves_its_own_face_alone(face, shared):
     assert hint in draw(panels.SANGUINE_PT_main), "what cannot follow is said"
 
 
+def test_the_rigs_sliders_ask_for_no_apply_but_a_new_one_does(face):
+    hint = "Changed: apply the skin to see it"
+    face.sanguine.emotion = "anger"
+    emotion_bone(face)["blood"] = 2.0
+    assert hint not in draw(panels.SANGUINE_PT_main)
+    bpy.ops.sanguine.add_feeling(feeling="pulse")  # blood beats where nothing moved it before
+    assert hint in draw(panels.SANGUINE_PT_main)
+    bpy.ops.sanguine.remove_feeling(feeling="pulse")
+    assert hint not in draw(panels.SANGUINE_PT_main)
+
+
 def test_other_nodes_are_a_change_only_when_asked_for(face):
     hint = "Changed: apply the skin to see it"
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
