@@ -141,7 +141,7 @@ class SANGUINE_OT_export_preset(_OfAFace, ExportHelper, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         face, path = active_face(context), bpy.path.abspath(self.filepath)
         try:
-            write_preset(path, preset_of_face(face, face.name))
+            write_preset(path, preset_of_face(face, face.name[:200]))
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -199,9 +199,11 @@ def detach() -> None:
 
 
 def skin_of(obj: bpy.types.Object) -> dict[str, float]:
-    """The whole skin of an object. Blender keeps floats in single precision, which can step over a bound."""
+    """The whole skin of an object. Blender keeps floats in single precision, which can step over a bound, and takes a NaN
+    from a script, which counts as the default."""
+    found = {row: getattr(obj.sanguine, row.id) for row in PARAMETERS.values()}
     return {
-        row.id: min(max(getattr(obj.sanguine, row.id), row.hard_min), row.hard_max) for row in PARAMETERS.values()
+        row.id: row.default if math.isnan(value) else min(max(value, row.hard_min), row.hard_max) for row, value in found.items()
     }
 
 

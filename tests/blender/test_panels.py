@@ -129,6 +129,13 @@ def test_a_profile_of_another_version_is_a_line_not_a_traceback(face):
     assert any("sanguine_profile" in line for line in drawn["SANGUINE_PT_plan"])
 
 
+def test_a_nan_of_a_script_counts_as_the_default(addon):
+    face = grid()
+    face.sanguine.melanin = float("nan")
+    assert skin_of(face)["melanin"] == PARAMETERS["melanin"].default
+    draw_all()
+
+
 # ---- the headline
 
 
@@ -306,7 +313,10 @@ def test_a_redraw_is_quick(face):
         assert seconds(lambda panel=panel: draw(panel)) < limit, panel.__name__
 
 
-def test_skin_sliders_act_at_once_and_ask_for_no_apply(face):
+@pytest.mark.parametrize("shading", ["OSL", "NODES"])
+def test_skin_sliders_act_at_once_and_ask_for_no_apply(face, shading):
+    face.sanguine.shading = shading
+    bpy.ops.sanguine.apply_skin()
     group = next(n for n in face.material_slots[0].material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     mine = {PARAMETERS[name].label for name in live_plan(face).sliders}
     assert mine == {socket.name for socket in group.inputs} - {e.label for e in EFFECTS if e.default_strength is not None}
