@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 import sanguine
 import sanguine_core
-from hypothesis import settings
-from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 from sanguine.app.tasks import Task, TaskRunner, run_tasks
 from sanguine.blender import adopt, operators, removal, skin
 from sanguine.blender import controls as sliders
@@ -581,59 +578,3 @@ def test_undo_and_redo_of_each(operator):
     for state in states[1:]:
         bpy.ops.ed.redo()
         same(state)
-
-
-class Artist(RuleBasedStateMachine):
-    """Presses buttons; what a poll refuses is not pressed."""
-
-    def __init__(self):
-        super().__init__()
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        face = make_face()
-        face.data.shape_keys.key_blocks["browDown_R"].value = 0.125
-        select(face)
-        bpy.ops.ed.undo_push(message="start")
-        self.before, self.depth, self.undone = inventory(), 0, 0
-
-    def press(self, name, **options):
-        operator = getattr(bpy.ops.sanguine, name)
-        if operator.poll():
-            assert operator(**options) == {"FINISHED"}
-            bpy.ops.ed.undo_push(message=name)
-            self.depth, self.undone = self.depth + 1, 0
-
-    @rule(name=st.sampled_from(["apply_skin", "adopt", "remove_skin", "bake_blood", "clear_blood", "add_poses"]))
-    def button(self, name):
-        self.press(name)
-
-    @rule(feeling=st.sampled_from(["shame", "blush", "pulse"]))
-    def more(self, feeling):
-        if rig := adopt.controls_of(bpy.data.objects["face"]):
-            if feeling not in rig.pose.bones["sanguine"]:
-                self.press("add_feeling", feeling=feeling)
-
-    @rule(feeling=st.sampled_from(["shame", "blush", "pulse", "anger"]))
-    def less(self, feeling):
-        if rig := adopt.controls_of(bpy.data.objects["face"]):
-            if feeling in rig.pose.bones["sanguine"]:
-                self.press("remove_feeling", feeling=feeling)
-
-    @precondition(lambda self: self.depth)
-    @rule()
-    def undo(self):
-        bpy.ops.ed.undo()
-        self.depth, self.undone = self.depth - 1, self.undone + 1
-
-    @precondition(lambda self: self.undone)
-    @rule()
-    def redo(self):
-        bpy.ops.ed.redo()
-        self.depth, self.undone = self.depth + 1, self.undone - 1
-
-    def teardown(self):
-        self.press("remove_skin")
-        same(self.before)
-
-
-def test_any_order_of_buttons_leaves_the_file_as_it_was():
-    run_state_machine_as_test(Artist, settings=settings(max_examples=50, stateful_step_count=8))
