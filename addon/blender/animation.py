@@ -29,6 +29,16 @@ def _needs_controls(cls: type[bpy.types.Operator], context: bpy.types.Context) -
     return True
 
 
+def _needs_own_controls(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """A library override takes new values for the sliders that it has, and forgets new sliders on saving."""
+    if not _needs_controls(cls, context):
+        return False
+    if rig_of(context).override_library:
+        cls.poll_message_set("The rig is a library override, which keeps no other sliders: change them in the file of the rig")
+        return False
+    return True
+
+
 # Blender keeps no reference to the texts of a list made on the fly: they have to live here.
 _LABELS = {
     **{name: (name.capitalize(), EMOTIONS[name].help) for name in EMOTION_CONTROLS},
@@ -66,7 +76,7 @@ class SANGUINE_OT_add_feeling(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _needs_controls(cls, context)
+        return _needs_own_controls(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.invoke_search_popup(self)
@@ -96,7 +106,7 @@ class SANGUINE_OT_remove_feeling(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _needs_controls(cls, context)
+        return _needs_own_controls(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.invoke_search_popup(self)
@@ -179,7 +189,7 @@ class SANGUINE_OT_load_profile(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _needs_controls(cls, context)
+        return _needs_own_controls(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)

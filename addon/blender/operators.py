@@ -113,7 +113,13 @@ class SANGUINE_OT_apply_skin(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave to object mode first")
             return False
-        return may_change(cls, active_face(context))
+        face = active_face(context)
+        if not may_change(cls, face):
+            return False
+        if face.override_library:
+            cls.poll_message_set("The face is a library override, which keeps no new skin: apply it in the file of the face")
+            return False
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         face = active_face(context)

@@ -129,11 +129,12 @@ def test_linked_and_overridden_plays_and_renders_as_at_home(library, tmp_path):
             equal(look(), pictures[anger])
     face = next(thing for thing in bpy.data.objects if thing.type == "MESH" and thing.override_library)
     select(face)
-    for name in ("adopt", "remove_skin", "apply_skin", "add_feeling", "remove_feeling", "bake_plain"):
-        operator = getattr(bpy.ops.sanguine, name)
-        if operator.poll():
-            print("offered on an override:", name)
-    assert not bpy.ops.sanguine.adopt.poll() and not bpy.ops.sanguine.remove_skin.poll()
+    for name in ("adopt", "remove_skin", "apply_skin", "add_feeling", "remove_feeling", "load_profile"):
+        with pytest.raises(RuntimeError, match="library override"):
+            getattr(bpy.ops.sanguine, name)()
+    with pytest.raises(RuntimeError, match="linked"):
+        bpy.ops.sanguine.bake_plain()
+    assert bpy.ops.sanguine.bake_blood() == {"FINISHED"}, "which an override keeps"
 
 
 def test_two_skins_in_one_scene_keep_their_own(tmp_path):
