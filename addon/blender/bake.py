@@ -74,6 +74,7 @@ def write_blood(face: bpy.types.Object, frames: np.ndarray, changes: Mapping[str
         path = f'["{name}"]'
         remove_curve(face, path)
         series = changes.get(name)
+        face[name] = 0.0  # not what its driver has left there
         if series is not None and np.any(series):
             set_keys(action_curve(face, path, group="Blood"), *_without_still(frames, series))
 
