@@ -23,7 +23,7 @@ hash = $(firstword $(shell cat $(1) | sha256sum))
 lists = $(1:%=tools/requirements-%.txt)
 BUILD_STAMP := $(VENV)/.build-$(call hash,$(call lists,build))
 RUN_STAMP := $(VENV)/.run-$(call hash,$(call lists,addon run))
-TEST_STAMP := $(VENV)/.test-$(call hash,$(call lists,test))
+TEST_STAMP := $(VENV)/.test-$(call hash,$(call lists,test docs))
 BENCH_STAMP := $(VENV)/.bench-$(call hash,$(call lists,test bench))
 NATIVE_STAMP := $(VENV)/.native
 ADDON_STAMP := $(VENV)/.addon
@@ -75,10 +75,12 @@ native: $(NATIVE_STAMP) $(RUN_STAMP) ## Build the native wheel and install it in
 
 openimageio: $(OIIO_STAMP) ## Fetch the libraries and headers of OpenImageIO
 
-docs: ## Write the pages that follow from the schema anew
-	$(PYTHON) tools/write_parameter_docs.py
-	$(PYTHON) tools/write_facs_docs.py
-	$(PYTHON) tools/write_skin_presets.py
+docs: setup $(TEST_STAMP) ## Write the pages that follow from the code anew, and the site into build/site
+	$(PY) tools/write_parameter_docs.py
+	$(PY) tools/write_facs_docs.py
+	$(PY) tools/write_skin_presets.py
+	$(PY) tools/write_docs_tables.py
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
 stub: native ## Write the committed stub of the native module anew
 	$(PY) -m nanobind.stubgen -m sanguine_core._core -o native/python/sanguine_core/_core.pyi
@@ -114,7 +116,7 @@ $(RUN_STAMP): | $(PY)
 	@rm -f $(VENV)/.run-* && touch $@
 
 $(TEST_STAMP): | $(PY)
-	$(PIP) --no-deps --requirement tools/requirements-test.txt
+	$(PIP) --no-deps --requirement tools/requirements-test.txt --requirement tools/requirements-docs.txt
 	@rm -f $(VENV)/.test-* && touch $@
 
 $(BENCH_STAMP): | $(PY)
