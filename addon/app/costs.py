@@ -14,6 +14,7 @@ from ..domain.lut import entry_skins
 from ..domain.parameters import default_skin
 from ..domain.plan import Plan
 from ..domain.texel_density import MapSizes
+from ..domain.walk import match_walk, slab_rgb, solved_slabs
 from .maps import LARGEST_WRINKLES
 
 _TIMED_ENTRIES = 4
@@ -34,8 +35,8 @@ class MapCost:
 
 @dataclass(frozen=True)
 class EffectCost:
-    """What an active effect adds to the preparation: entries of the table that would not be there without it, at what
-    solving them takes on one core; the memory of its maps, of which `shared` serve another active effect too."""
+    """What an active effect adds to the preparation: entries of the table that would not be there without it (of thin
+    parts, what matching the walk takes), at what solving them takes on one core; the memory of its maps, of which `shared` serve another active effect too."""
 
     milliseconds: float
     megabytes: float
@@ -52,6 +53,29 @@ def entry_ms(lobes: int) -> float:
         sanguine_core.burley_lobes(skins, "rec709", lobe_count=lobes, threads=1)
         times.append(time.perf_counter() - start)
     return min(times) * 1000.0 / _TIMED_ENTRIES
+
+
+@functools.cache
+def _walk_ms() -> tuple[float, float]:
+    """What a slab of skin takes to solve, and an entry of the table to match with a walk, on this machine and one core."""
+    skins = entry_skins((), default_skin())
+    back = sanguine_core.burley_lobes(skins, "rec709", lobe_count=1)["weights"].sum(1)
+    match_walk(back, slab_rgb(skins, "rec709"))  # the walk's own table is made once
+    slabs, matches, many = [], [], 256
+    for _ in range(_RUNS):
+        start = time.perf_counter()
+        through = slab_rgb(skins, "rec709")
+        slabs.append(time.perf_counter() - start)
+        start = time.perf_counter()
+        match_walk(back.repeat(many, axis=0), through.repeat(many, axis=0))
+        matches.append(time.perf_counter() - start)
+    return min(slabs) * 1000.0 / solved_slabs(set()), min(matches) * 1000.0 / many
+
+
+def walk_ms(plan: Plan) -> float:
+    """What the walk adds to the table of a plan that has one."""
+    slab, match = _walk_ms()
+    return solved_slabs({axis.id for axis in plan.axes}) * slab + plan.entries * match
 
 
 def map_costs(plan: Plan, sizes: MapSizes, tiles: int) -> dict[str, MapCost]:
@@ -72,8 +96,10 @@ def effect_costs(plan: Plan, megabytes: Mapping[str, float]) -> dict[str, Effect
     costs = {}
     for name, maps in used.items():
         others = set().union(*(other for key, other in used.items() if key != name))
+        without = plan.without(name)
+        walk = walk_ms(plan) if plan.walk and not without.walk else 0.0
         costs[name] = EffectCost(
-            (plan.entries - plan.without(name).entries) * entry_ms(plan.settings.lobes),
+            (plan.entries - without.entries) * entry_ms(plan.settings.lobes) + walk,
             sum(megabytes.get(key, 0.0) for key in maps),
             tuple(sorted(maps & others)),
         )

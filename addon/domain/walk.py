@@ -125,6 +125,12 @@ def slab_rgb(skins: np.ndarray, working_space: str | np.ndarray, thicknesses_mm:
     return sanguine_core.linear_rgb(xyz, working_space).reshape(len(skins), len(thicknesses_mm), 3)
 
 
+def solved_slabs(varying: set[str]) -> int:
+    """How many slabs `slab_rgb` solves for skins that differ in these parameters."""
+    dermis = varying & {"hemoglobin", "oxygenation", "ink_per_mm"}
+    return len(_NM) * len(FIT_MM) * (_NODES if "melanin" in varying else 1) * (_NODES if dermis else 1)
+
+
 def _slabs(mu_a_epidermis, mu_a_dermis, mu_s_prime_epidermis, mu_s_prime_dermis, epidermis_mm, thicknesses_mm):
     """(N, thicknesses) light through at one wavelength.
 

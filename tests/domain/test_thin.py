@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sanguine_core
+from sanguine.app.costs import effect_costs
 from sanguine.domain import walk
 from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.effects.thin import FULL_MM, GONE_MM, lit_share, thinness
@@ -121,3 +122,10 @@ def test_thickness_and_openness_fade():
     assert np.all(np.diff(thinness(t)) <= 0.0)
     assert thinness(FULL_MM) == 1.0 and thinness(GONE_MM) == 0.0 and thinness(np.inf) == 0.0 and thinness(0.0) == 1.0
     assert lit_share(0.0) == 0.0 and lit_share(1.0) == 1.0
+
+
+def test_the_plan_knows_what_the_walk_costs_to_prepare():
+    """By time here and now, so roughly: a table of some axes costs more than a single skin, and neither nothing."""
+    one, many = (effect_costs(plan(1.0, live=live), {})["thin"].milliseconds for live in (False, True))
+    assert 0.0 < one < many
+    assert "thin" not in effect_costs(plan(0.0), {})

@@ -13,6 +13,7 @@ from sanguine.domain.effects import Frame, Scene
 from sanguine.domain.effects.thin import ATTRIBUTE
 from sanguine.domain.parameters import default_skin, skin_rows
 from sanguine.domain.plan import make_plan
+from sanguine.domain.shading import NODES, OSL
 from support.patch import empty_scene, render_linear, white_world
 
 D65 = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
@@ -30,8 +31,9 @@ def delta_e(a, b):
     return colour.delta_E(lab(a), lab(b), method="CIE 2000")
 
 
-def skin_material(skin, strength=1.0):
-    return build_skin_material("skin", make_plan(Scene(skin, (Frame("0"),), {"thin": strength})), {})
+def skin_material(skin, shading=OSL):
+    bpy.context.scene.cycles.shading_system = shading == OSL
+    return build_skin_material("skin", make_plan(Scene(skin, (Frame("0"),), {"thin": 1.0})), {}, shading=shading)
 
 
 def thing(vertices, faces, material, thin):
@@ -56,8 +58,11 @@ def box(thickness, half=0.1):
     return vertices, [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 
 
-@pytest.mark.parametrize(("name", "tilt"), [("light", 0.0), ("light", 1.2), ("dark", 0.0), ("deep", 0.0)])
-def test_no_border_shows_where_a_walk_takes_over(name, tilt):
+@pytest.mark.parametrize(
+    ("name", "tilt", "shading"),
+    [("light", 0.0, OSL), ("light", 1.2, OSL), ("dark", 0.0, OSL), ("deep", 0.0, OSL), ("light", 1.2, NODES)],
+)
+def test_no_border_shows_where_a_walk_takes_over(name, tilt, shading):
     """A patch whose mask rises from 0 to 1 over 20 mm, in a white world: Delta E 2000 below 0.6 along it, little more than
     half of what an observer sees side by side. Noise of a band is 0.15 (dark lobes are the noisy part); the rest is the
     curve's own error (`walk.CURVE`, 0.7 %)."""
@@ -65,7 +70,7 @@ def test_no_border_shows_where_a_walk_takes_over(name, tilt):
     white_world(scene)
     xs, ys = (-0.1, -0.01, 0.01, 0.1), (-0.1, 0.1)
     vertices = [(x, y, 0.0) for y in ys for x in xs]
-    thing(vertices, [(i, i + 1, i + 5, i + 4) for i in range(3)], skin_material(SKINS[name]), [0.0, 0.0, 1.0, 1.0] * 2)
+    thing(vertices, [(i, i + 1, i + 5, i + 4) for i in range(3)], skin_material(SKINS[name], shading), [0.0, 0.0, 1.0, 1.0] * 2)
     camera(0.03, tilt)
     bands = render_linear().mean(0).reshape(4, 6, 3).mean(1)  # lobes for the most part, two mixes, walk
     assert delta_e(bands[1:], bands[0]).max() < 0.6
@@ -93,8 +98,8 @@ shader walk(output closure color BSDF = 0) {{
 
 
 @pytest.mark.parametrize("thickness_mm", [1.5, 3.0])
-@pytest.mark.parametrize("name", ["light", "dark"])
-def test_light_through_a_slab_is_the_skins_own(name, thickness_mm):
+@pytest.mark.parametrize(("name", "shading"), [("light", OSL), ("dark", OSL), ("light", NODES)])
+def test_light_through_a_slab_is_the_skins_own(name, shading, thickness_mm):
     """A plate lit from below by a white sky, seen from above, against the solver's slab with epidermis on both sides.
 
     Delta E 2000 below 3 with the film exposed so that light skin's slab of 1.5 mm is at L* 75 or so; lobes alone are off by
@@ -114,7 +119,7 @@ def test_light_through_a_slab_is_the_skins_own(name, thickness_mm):
     tree.links.new(place.outputs["Generated"], part.inputs[0])
     tree.links.new(part.outputs["Z"], below.inputs[0])
     tree.links.new(below.outputs[0], tree.nodes["Background"].inputs["Color"])
-    thing(*box(thickness_mm / 1000.0), skin_material(SKINS[name]), [1.0] * 8)
+    thing(*box(thickness_mm / 1000.0), skin_material(SKINS[name], shading), [1.0] * 8)
     camera(0.01)
     seen = render_linear().mean((0, 1))
     exact = np.maximum(walk.slab_rgb(skin_rows([SKINS[name]]), "rec709", (thickness_mm,))[0, 0], 0.0)
