@@ -40,6 +40,11 @@ def _matrix(space: Space) -> np.ndarray:
     return sanguine_core.linear_rgb(100.0 * np.eye(3), space).T if isinstance(space, str) else space
 
 
+def from_rec709(rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A colour that stands in the sources as linear Rec.709, in the file's working space."""
+    return rgb if working_space() == "rec709" else tuple(Color(rgb).from_rec709_linear_to_scene_linear())
+
+
 def as_json(space: Space) -> str:
     return json.dumps(space if isinstance(space, str) else space.tolist())
 

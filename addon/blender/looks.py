@@ -8,6 +8,7 @@ import bpy
 
 from ..domain.head.eyes import LIMBUS_UV
 from ..domain.head.presets import Preset
+from .colour import from_rec709
 
 RGB = tuple[float, float, float]
 
@@ -31,7 +32,7 @@ class Nodes:
             if isinstance(value, bpy.types.NodeSocket):
                 self.tree.links.new(value, socket)
             elif value is not None:
-                socket.default_value = (*value, 1.0) if socket.type == "RGBA" else value
+                socket.default_value = (*from_rec709(value), 1.0) if socket.type == "RGBA" else value
         return next(socket for socket in node.outputs if socket.enabled)
 
     def math(self, operation: str, *values: Any) -> Any:
@@ -49,7 +50,7 @@ class Nodes:
             if isinstance(value, bpy.types.NodeSocket):
                 self.tree.links.new(value, sockets[identifier])
             else:
-                sockets[identifier].default_value = value if identifier == "Factor_Float" else (*value, 1.0)
+                sockets[identifier].default_value = value if identifier == "Factor_Float" else (*from_rec709(value), 1.0)
         return next(s for s in node.outputs if s.identifier == "Result_Color")
 
     def noise(self, vector: Any, scale: float, detail: float = 2.0, roughness: float = 0.5) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import sanguine
 import sanguine_core
+from sanguine.blender import looks
 from sanguine.blender.colour import READ_IN, follow_working_space, strange_images, working_space
 from sanguine.blender.images import data_image
 from sanguine.blender.material import build_skin_material
@@ -117,6 +118,24 @@ def test_the_panel_says_so_and_one_click_follows():
         assert follow not in draw(SANGUINE_PT_main), "Apply Skin solves for the space that the file has"
     finally:
         sanguine.unregister()
+
+
+@pytest.mark.skipif(not CHOOSES, reason="before Blender 5.0 a file does not choose")
+def test_colours_of_the_example_heads_are_those_of_the_sources():
+    def reds():
+        n = looks.Nodes("look")
+        material = n.principled(Base_Color=(0.5, 0.1, 0.05))
+        mixed = n.mix(0.5, (0.5, 0.1, 0.05), (0.2, 0.2, 0.2)).node
+        (shader,) = (node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        sockets = [shader.inputs["Base Color"], *(s for s in mixed.inputs if s.identifier in ("A_Color", "B_Color"))]
+        return np.array([socket.default_value[:3] for socket in sockets])
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    own = reds()
+    np.testing.assert_allclose(own[0], (0.5, 0.1, 0.05), atol=1e-7)
+    choose("acescg")
+    # Single precision, and Blender's rounding of the matrices.
+    np.testing.assert_allclose(reds() @ xyz_of("ACEScg").T, own @ xyz_of("sRGB").T, atol=1e-3)
 
 
 CUSTOM = """
