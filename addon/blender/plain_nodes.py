@@ -1,4 +1,4 @@
-"""A stage's graph (`domain/osl_graph.py`) as ordinary nodes, in a node group that has the sockets of its OSL script."""
+"""A stage's graph (`domain/op_graph.py`) as ordinary nodes, in a node group that has the sockets of its OSL script."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from ..domain.osl_graph import Closure, Graph, Op, Untranslatable
-
+from ..domain.op_graph import Closure, Graph, Op, Untranslatable
 
 # Operation -> that of the Math node, of the Vector Math node.
 _MATH = {

@@ -7,7 +7,8 @@ import pytest
 from sanguine.domain import film, strain
 from sanguine.domain.effects import EFFECTS, Frame, Scene
 from sanguine.domain.effects.regions import FACE_REGIONS
-from sanguine.domain.osl_graph import Closure, Untranslatable, compile_stage, evaluate
+from sanguine.domain.op_graph import Closure, Untranslatable, evaluate
+from sanguine.domain.osl_graph import compile_stage
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import default_strengths, make_plan
 from sanguine.domain.shader import assemble
