@@ -91,8 +91,8 @@ extension: native ## Build the Blender extension into dist/
 matrix: extension $(TEST_STAMP) ## Run the Blender tests on the other Blender versions
 	tools/matrix.sh $(MATRIX)
 
-window: setup extension ## Click through the panel in a real Blender's window (root; WINDOW_ROOT is its Debian 13 folder)
-	tools/window/run.sh $(WINDOW_ROOT) out/window $(PARTS)
+window: setup extension ## Click through the panel in a real Blender's window (root; WINDOW_ROOT is its Debian 13 folder; KEEP=1: pictures of docs/ anew)
+	KEEP=$(KEEP) tools/window/run.sh $(WINDOW_ROOT) out/window $(PARTS)
 
 chroots: setup extension ## Install the zip in bare Debians with three Blenders, cut off from the network (root; ROOMS="bookworm trixie window")
 	tools/chroots/run.sh $(CHROOTS) $(WINDOW_ROOT) $(ROOMS)

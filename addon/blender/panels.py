@@ -229,7 +229,7 @@ def _swatch(layout: bpy.types.UILayout, face: bpy.types.Object) -> None:
     numbers.scale_y = 0.8
     numbers.label(text="L* {:.0f}  a* {:.0f}  b* {:.0f}".format(*shown.lab))
     numbers.label(text=f"ITA {shown.ita:.0f}\N{DEGREE SIGN}, {class_at(shown.ita).replace('-', ' ')}")
-    numbers.label(text="400 to 700 nm, to 80 %")
+    numbers.label(text="400\N{EN DASH}700 nm, 0\N{EN DASH}80 %")
     row.template_icon(spectrum_icon(skin), scale=6.5)
     if skin_map.MAP in images_of(face) and getattr(face.sanguine, switch_property(skin_map.MAP)):
         layout.label(text="A skin map stands in its place", icon="INFO")
@@ -321,6 +321,7 @@ class SANGUINE_PT_features(_Part):
         column = layout.column(align=True)
         for name in Growth.__dataclass_fields__:
             column.prop(settings, name)
+        layout.use_property_split = False  # their names are long
         _parameters(layout, settings, "features")
 
 

@@ -128,7 +128,11 @@ def own_character(target: str) -> None:
     without_controls(objects)
     set_stage(scene, *(tuple(map(float, head.landmarks[name])) for name in ("eyes", "chin", "crown")), RENDER)
     scene.cycles.samples = SAMPLES
-    scene.render.use_persistent_data = False
+    scene.cycles.use_denoising = False  # Debian's Blender is built without the denoiser and then renders nothing
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            if area.type == "VIEW_3D":
+                area.spaces[0].region_3d.view_perspective = "CAMERA"
     save(target, objects.skin)
     left = [block.name for kind in ("objects", "materials", "texts", "images", "node_groups") for block in getattr(bpy.data, kind)]
     assert not any("sanguine" in name.lower() for name in left), left

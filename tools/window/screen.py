@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 WIDTH, HEIGHT = 1400, 900
-DISPLAY = ":77"
 SCALE = 3  # Tesseract wants letters of some 30 pixels; Blender's have 10
 ALIKE = 0.8  # share of the letters that have to be read right
 STILL_S = 0.25  # a picture that did not change for so long is drawn
@@ -49,7 +48,7 @@ WHOLE = Box(0, 0, WIDTH, HEIGHT)
 class Screen:
     """Xvfb and the Blender in it. `ask` and `do` run Python inside it (bridge.py)."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, home: Path | None = None) -> None:
         self.folder = folder
         self.shots = folder / "shots"
         self.shots.mkdir(exist_ok=True)
@@ -57,14 +56,20 @@ class Screen:
         path = str(folder / "bridge.socket")
         Path(path).unlink(missing_ok=True)
         geometry = f"{WIDTH}x{HEIGHT}x24"
+        free, said = os.pipe()  # Xvfb takes a display that nobody has, and says which
         self.server = subprocess.Popen(
-            ["Xvfb", DISPLAY, "-screen", "0", geometry, "+extension", "GLX", "-nolisten", "tcp",
-             "-fbdir", str(folder)], stderr=subprocess.DEVNULL
+            ["Xvfb", "-displayfd", str(said), "-screen", "0", geometry, "+extension", "GLX", "-nolisten", "tcp",
+             "-fbdir", str(folder)], stderr=subprocess.DEVNULL, pass_fds=(said,)
         )  # fmt: skip
+        os.close(said)
+        with os.fdopen(free) as answer:
+            display = answer.readline().strip()
+        if not display:
+            raise Failed("Xvfb does not start")
         self.pixels = folder / "Xvfb_screen0"  # what is on the screen, as a file
-        self.environment = dict(os.environ, DISPLAY=DISPLAY, LIBGL_ALWAYS_SOFTWARE="1", SANGUINE_BRIDGE=path)
+        where = {"HOME": str(home)} if home else {}
+        self.environment = dict(os.environ | where, DISPLAY=f":{display}", LIBGL_ALWAYS_SOFTWARE="1", SANGUINE_BRIDGE=path)
         atexit.register(self.close)
-        time.sleep(1.0)
         with self.log.open("ab") as log:
             self.blender = subprocess.Popen(
                 ["blender", "-p", "0", "0", str(WIDTH), str(HEIGHT), *arguments, "--python", str(folder / "bridge.py")],
@@ -86,6 +91,11 @@ class Screen:
             if process.poll() is None:
                 process.terminate()
                 process.wait(10)
+
+    def cpu_s(self) -> float:
+        """Processor time that Blender has taken so far."""
+        fields = Path(f"/proc/{self.blender.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # utime, stime: proc(5)
 
     def _question(self, **question: str) -> Any:
         try:
@@ -149,12 +159,14 @@ class Screen:
                 found.append((row["text"], Box(box.x + x, box.y + y, width, height)))
         return found
 
-    def find(self, text: str, box: Box = WHOLE, turned: bool = False) -> Box:
-        """Where `text` is written. Raises Failed with all that is written there."""
+    def find(self, text: str, box: Box = WHOLE, turned: bool = False, begins: range | None = None) -> Box:
+        """Where `text` is written; begins: at which x. Raises Failed with all that is written there."""
         wanted = "".join(text.lower().split())
         words = self.words(box, turned)
         best, place = 0.0, None
         for first in range(len(words)):
+            if begins and words[first][1].x not in begins:
+                continue
             for last in range(first, min(first + len(text.split()) + 1, len(words))):
                 run = words[first : last + 1]
                 if not turned and max(b.y for _, b in run) - min(b.y for _, b in run) > 6:
@@ -172,11 +184,25 @@ class Screen:
         self._run("xdotool", "mousemove", str(x), str(y))
         time.sleep(0.15)
 
+    def press(self, x: int, y: int) -> None:
+        """A click, without waiting for what comes of it."""
+        self.move(x, y)
+        self._run("xdotool", "click", "1")
+
+    def press_key(self, key: str) -> None:
+        self._run("xdotool", "key", key)
+
     def click(self, x: int, y: int, *held: str, button: int = 1) -> None:
         self.move(x, y)
         self._run("xdotool", *(["keydown", *held] if held else []), "click", str(button))
         if held:
             self._run("xdotool", "keyup", *held)
+        self.settle()
+
+    def scroll(self, x: int, y: int, notches: int) -> None:
+        """Turns the wheel there; down is positive."""
+        self.move(x, y)
+        self._run("xdotool", "click", "--repeat", str(abs(notches)), "--delay", "20", "5" if notches > 0 else "4")
         self.settle()
 
     def drag(self, start: tuple[int, int], end: tuple[int, int], steps: int = 12) -> None:
@@ -198,6 +224,25 @@ class Screen:
     def type(self, text: str) -> None:
         self._run("xdotool", "type", "--delay", "60", text)
         self.settle()
+
+    def window(self, title: str, box: Box) -> None:
+        """Puts a further window of Blender's there: without a window manager it opens wherever the mouse is."""
+        until = time.monotonic() + PATIENCE_S
+        while time.monotonic() < until:
+            for number in self._run("xdotool", "search", "--onlyvisible", "--name", title).decode().split():
+                self._run("xdotool", "windowsize", number, str(box.width), str(box.height))
+                self._run("xdotool", "windowmove", number, str(box.x), str(box.y))
+                self.settle()
+                return
+            time.sleep(0.1)
+        raise Failed(f"no window '{title}'")
+
+    def close_windows(self) -> None:
+        """All but the first, as their frames' X would."""
+        self.do(
+            "for w in list(bpy.context.window_manager.windows)[1:]:\n"
+            "    with bpy.context.temp_override(window=w): bpy.ops.wm.window_close()"
+        )
 
     def region(self, kind: str = "UI", area: str = "VIEW_3D") -> Box:
         """A region of the window's first area of a type."""
