@@ -102,6 +102,12 @@ def groups_of(material: bpy.types.Material) -> list[bpy.types.NodeTree]:
     return [node.node_tree for node in nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
 
 
+def properties_read(material: bpy.types.Material) -> set[str]:
+    """The object's properties that a skin reads."""
+    nodes = (node for group in groups_of(material) for node in group.nodes if node.bl_idname == "ShaderNodeAttribute")
+    return {node.attribute_name for node in nodes if node.attribute_type == "OBJECT"}
+
+
 def _parts(group: bpy.types.NodeTree) -> Iterator[bpy.types.ID]:
     """Images, texts and inner groups of a skin's group, those that come with the face apart."""
     for node in group.nodes:

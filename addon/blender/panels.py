@@ -18,7 +18,7 @@ from ..domain.parameters import PARAMETERS
 from ..domain.people import class_at
 from ..domain.plan import Plan
 from ..domain.quality import PRESETS, WITHIN, Point, chosen_point
-from ..domain.shading import OSL, not_shown
+from ..domain.shading import EEVEE, OSL, not_shown
 from .adopt import SANGUINE_OT_adopt, SANGUINE_OT_remove_skin, skinned_face
 from .animation import (
     SANGUINE_OT_add_feeling,
@@ -35,7 +35,7 @@ from .capture import SANGUINE_OT_import_capture
 from .controls import CONTROL_BONE, OPTIONAL
 from .example import SANGUINE_OT_add_head
 from .headline import NEUTRAL, animated_emotions, emotion_of, shown_emotions
-from .material import MARK
+from .material import MARK, properties_read
 from .migration import newer
 from .operators import (
     SANGUINE_OT_apply_skin,
@@ -264,9 +264,10 @@ def _sliders(layout: bpy.types.UILayout, bone: bpy.types.PoseBone, names: Iterab
 
 def _not_shown(scene: bpy.types.Scene, face: bpy.types.Object | None) -> str:
     """Why this Blender, as it is set, does not show the face's skin; "" where it does or there is none."""
-    ours = (material[MARK] for material in face.data.materials if material and MARK in material) if face else ()
+    ours = (slot.material for slot in face.material_slots if slot.material and MARK in slot.material) if face else ()
     renderer = renderer_of(scene)
-    return next(filter(None, (not_shown(mark.get("shading", OSL), renderer) for mark in ours)), "")
+    lines = (not_shown(m[MARK].get("shading", OSL), renderer, len(properties_read(m))) for m in ours)
+    return next(filter(None, lines), "")
 
 
 def _slider_label(bone: bpy.types.PoseBone, name: str) -> str:
@@ -448,7 +449,8 @@ class SANGUINE_PT_plan(_Part):
         maps = "no UV map, so no maps" if view.megabytes is None else f"{_megabytes(view.megabytes)} of maps"
         _wrapped(layout, context, f"{table}; {maps}")
         layout.prop(face.sanguine, "shading")
-        layout.operator(SANGUINE_OT_bake_plain.bl_idname, icon="NODE_MATERIAL")
+        bake = layout.operator(SANGUINE_OT_bake_plain.bl_idname, icon="NODE_MATERIAL")
+        bake.eevee = context.scene.render.engine in EEVEE
         try:
             _wrapped(layout, context, "Skin is " + shading_of(context.scene, face).line)
         except ValueError as error:

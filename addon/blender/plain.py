@@ -19,13 +19,16 @@ from .skin import our_slot
 _STAGE = re.compile(r"\bshader\s+sanguine_(\w+)")
 
 
-def bake_plain(face: bpy.types.Object) -> str:
+def bake_plain(face: bpy.types.Object, eevee: bool = False) -> str:
     """Replaces the script nodes of a face's skin by plain nodes and packs its images. Returns what was done, a line.
 
-    Table, maps, sliders and what drives them stay as they are. Raises InputError, before anything is changed, for a
-    script without plain nodes or an image without pixels.
+    Table, maps, sliders and what drives them stay as they are. eevee: what the material reads of the object becomes
+    drivers, as EEVEE reads no more than eight properties. Raises InputError, before anything is changed, for a script
+    without plain nodes or an image without pixels.
     """
     material = face.material_slots[our_slot(face)].material
+    if eevee and material.users - int(material.use_fake_user) > 1:
+        raise InputError(f"{face.name}: other objects have its skin too, whose drivers would follow this one: make it single-user")
     groups = groups_of(material)
     images = [node.image for group in groups for node in group.nodes if node.bl_idname == "ShaderNodeTexImage" and node.image]
     for image in images:
@@ -36,6 +39,7 @@ def bake_plain(face: bpy.types.Object) -> str:
     ]
     for group, script, plain in replaced:
         _take_over(group, script, plain)
+    driven = sum(_drive(face, group) for group in groups) if eevee else 0
     packed = 0
     for image in dict.fromkeys(images):
         if not image.packed_files and image.library is None:
@@ -47,7 +51,8 @@ def bake_plain(face: bpy.types.Object) -> str:
         if not has_scripts() and face.name in scene.objects:
             scene.cycles.shading_system = False  # Cycles' own nodes are faster
     nodes = sum(len(plain.node_tree.nodes) for _, _, plain in replaced)
-    return f"{len(replaced)} scripts are {nodes} nodes; {packed} images packed, all are in the file"
+    more = f"; {driven} values are drivers" if eevee else ""
+    return f"{len(replaced)} scripts are {nodes} nodes{more}; {packed} images packed, all are in the file"
 
 
 def _plain(group: bpy.types.NodeTree, script: bpy.types.Node) -> bpy.types.Node:
@@ -83,6 +88,35 @@ def _take_over(group: bpy.types.NodeTree, script: bpy.types.Node, plain: bpy.typ
         bpy.data.texts.remove(text)
 
 
+def _drive(face: bpy.types.Object, group: bpy.types.NodeTree) -> int:
+    """Drivers in the place of the nodes that read the object's properties. Returns how many values they drive."""
+    count = 0
+    for node in [n for n in group.nodes if n.bl_idname == "ShaderNodeAttribute" and n.attribute_type == "OBJECT"]:
+        path = f'["{node.attribute_name}"]'
+        for source, kind, index in (("Fac", "ShaderNodeValue", ""), ("Alpha", "ShaderNodeValue", "[3]"), ("Color", "ShaderNodeCombineXYZ", "")):
+            if not node.outputs[source].is_linked:
+                continue
+            value = group.nodes.new(kind)
+            value.label, value.location, value.hide = f"{node.attribute_name}{index}", node.location, True
+            for link in list(node.outputs[source].links):
+                group.links.new(value.outputs[0], link.to_socket)
+            sockets = value.inputs if source == "Color" else value.outputs
+            for i, socket in enumerate(sockets):
+                at = path + (f"[{i}]" if source == "Color" else index)
+                try:
+                    socket.default_value = face.path_resolve(at)
+                except ValueError:
+                    socket.default_value = 0.0  # as of an Attribute node: no such property
+                    continue
+                driver = socket.driver_add("default_value").driver
+                driver.type = "SUM"
+                variable = driver.variables.new()
+                variable.targets[0].id, variable.targets[0].data_path = face, at
+                count += 1
+        group.nodes.remove(node)
+    return count
+
+
 class SANGUINE_OT_bake_plain(bpy.types.Operator):
     bl_idname = "sanguine.bake_plain"
     bl_label = "Bake to Plain Material"
@@ -92,6 +126,12 @@ class SANGUINE_OT_bake_plain(bpy.types.Operator):
         "skin again makes what Material says"
     )
     bl_options = {"REGISTER", "UNDO"}
+
+    eevee: bpy.props.BoolProperty(
+        name="For EEVEE",
+        description="EEVEE hands eight properties of an object to a material and takes the rest for 0. With this, drivers of the "
+        "material read them, which then is this object's alone",
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -111,7 +151,7 @@ class SANGUINE_OT_bake_plain(bpy.types.Operator):
         face = active_face(context)
         try:
             with nothing_left_behind():
-                done = bake_plain(face)
+                done = bake_plain(face, self.eevee)
         except (ValueError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -10,8 +10,11 @@ AUTO, OSL, NODES = "AUTO", "OSL", "NODES"
 SHADINGS = (AUTO, OSL, NODES)
 
 CYCLES = "CYCLES"
-# Engines that draw a material's nodes; EEVEE has had two names.
-_DRAW_NODES = (CYCLES, "BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
+EEVEE = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
+"""It has had two names."""
+EEVEE_PROPERTIES = 8
+"""Properties of an object that EEVEE hands to a material (GPU_MAX_UNIFORM_ATTR in Blender's source, the same since 3.0);
+the others it takes for 0, without a word."""
 # Devices of Cycles that run OSL, as its preferences name them.
 _RUN_OSL = ("CPU", "OPTIX")
 
@@ -55,10 +58,13 @@ def choose(wanted: str, renderer: Renderer) -> Choice:
     return Choice(OSL, f"Cycles runs OSL on {renderer.device}")
 
 
-def not_shown(shading: str, renderer: Renderer) -> str:
-    """Why this Blender does not show a skin of this kind, a line for people, "" where it does."""
+def not_shown(shading: str, renderer: Renderer, properties: int = 0) -> str:
+    """Why this Blender does not show a skin of this kind, a line for people, "" where it does. properties: how many of
+    the object's its material reads."""
     if shading == NODES:
-        return "" if renderer.engine in _DRAW_NODES else "Only Cycles and EEVEE show the skin:"
+        if renderer.engine in EEVEE and properties > EEVEE_PROPERTIES:
+            return f"EEVEE reads {EEVEE_PROPERTIES} of {properties} values: bake to plain"
+        return "" if renderer.engine in (CYCLES, *EEVEE) else "Only Cycles and EEVEE show the skin:"
     if renderer.engine != CYCLES:
         return "Only Cycles shows a skin of OSL:"
     if renderer.no_osl:

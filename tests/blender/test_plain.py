@@ -14,6 +14,7 @@ from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.errors import InputError
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import check_strengths, make_plan
+from sanguine.domain.shading import EEVEE_PROPERTIES
 from support.patch import camera_above, empty_scene, render_linear, white_world
 
 KINDS = ("images", "materials", "node_groups", "texts")
@@ -125,6 +126,34 @@ def test_bake_to_plain_material_keeps_the_picture_and_needs_nothing(face, addon,
         np.testing.assert_allclose(after, before, rtol=1e-3, atol=1e-4)
     else:  # of other paths: tests/render/test_twins.py
         np.testing.assert_allclose(after.mean((0, 1)), before.mean((0, 1)), rtol=0.01)
+
+
+def test_for_eevee_the_object_is_read_by_drivers(face, addon):
+    """Also where they stand for an array; what is moved afterwards shows in the picture."""
+    apply_skin(face, None, plan(), shading="NODES")
+    bpy.context.view_layer.objects.active = face
+    names = {node.attribute_name for node in group(face).node_tree.nodes if node.type == "ATTRIBUTE" and node.attribute_type == "OBJECT"}
+    assert len(names) > EEVEE_PROPERTIES, "more than EEVEE reads"
+    for name in names:
+        face[name] = -0.004
+    face.update_tag()
+    pale = render_linear()
+    assert bpy.ops.sanguine.bake_plain(eevee=True) == {"FINISHED"}
+    assert not reads(face)[0] & {("OBJECT", name) for name in names}
+    drivers = group(face).node_tree.animation_data.drivers
+    assert {curve.driver.variables[0].targets[0].data_path[2:-2] for curve in drivers} == names
+    np.testing.assert_allclose(render_linear(), pale, rtol=1e-3, atol=1e-4)
+    for name in names:
+        face[name] = 0.01 if "hemoglobin" in name else 0.0
+    face.update_tag()
+    flushed = render_linear()
+    assert flushed[..., 1].mean() < 0.97 * pale[..., 1].mean(), "more blood takes green"
+    other = face.copy()
+    bpy.context.scene.collection.objects.link(other)
+    other.material_slots[0].link = "OBJECT"
+    other.material_slots[0].material = face.material_slots[0].material
+    with pytest.raises(RuntimeError, match="make it single-user"):
+        bpy.ops.sanguine.bake_plain(eevee=True)
 
 
 def test_baking_twice_is_no_harm_and_a_script_without_plain_nodes_changes_nothing(face, addon):

@@ -40,11 +40,17 @@ def test_asked_for_is_asked_for():
     (OSL, Renderer(device="HIP"), "No OSL on HIP"),
     (NODES, Renderer("BLENDER_WORKBENCH"), "Only Cycles and EEVEE"),
     (NODES, Renderer("BLENDER_EEVEE"), ""),
+    (OSL, Renderer(), ""),
     (NODES, Renderer(no_osl=DEBIAN, device="HIP"), ""),
 ])
 def test_the_panel_knows_what_is_not_shown(shading, renderer, says):
     said = not_shown(shading, renderer)
     assert says in said and bool(says) == bool(said)
+
+
+def test_eevee_reads_eight_properties():
+    assert not_shown(NODES, Renderer("BLENDER_EEVEE"), 8) == "" == not_shown(NODES, Renderer(), 30)
+    assert "8 of 9" in not_shown(NODES, Renderer("BLENDER_EEVEE"), 9)
 
 
 def test_a_shot_names_its_material_and_the_plan_says_why(tmp_path):
