@@ -37,7 +37,7 @@ NATIVE_SOURCES := CMakeLists.txt pyproject.toml addon/blender_manifest.toml \
 # Two steps that install into one environment must not run side by side.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help demo test soak bench docs native setup openimageio stub extension matrix chroots window clean system
+.PHONY: help demo test soak bench docs pictures native setup openimageio stub extension matrix chroots window clean system
 
 help: ## List the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -81,6 +81,9 @@ docs: setup $(TEST_STAMP) ## Write the pages that follow from the code anew, and
 	$(PY) tools/write_skin_presets.py
 	$(PY) tools/write_docs_tables.py
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
+
+pictures: setup $(BENCH_STAMP) ## Make the pictures of docs/ anew: hours, or ONLY=people,strain (tools/pictures.toml lists them)
+	$(PY) tools/pictures.py --only "$(ONLY)"
 
 stub: native ## Write the committed stub of the native module anew
 	$(PY) -m nanobind.stubgen -m sanguine_core._core -o native/python/sanguine_core/_core.pyi

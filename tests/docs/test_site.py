@@ -111,8 +111,9 @@ def test_links_anchors_and_pictures_are_there(site, built):
     assert not missing
 
 
-def test_lists_and_tables_are_seen_as_such(site):
+def test_lists_and_tables_are_seen_as_such(built):
     """A list or table straight below a line of text is one to GitHub and none to MkDocs."""
+    assert not [path.name for path in built if "|---" in path.read_text(encoding="utf-8")]
     for page in PAGES:
         lines = re.sub(r"(?ms)^```.*?^```$", "", page.read_text(encoding="utf-8")).split("\n")
         for above, line in itertools.pairwise(lines):
@@ -347,7 +348,7 @@ def test_the_readme_has_two_commands_and_leads_to_the_pages():
     commands = re.search(r"## Two commands\n(.*?)\n## ", text, re.DOTALL).group(1)
     assert re.findall(r"(?m)^    make (\w+)", commands) == ["demo", "test"]
     linked = set(re.findall(r"\]\(docs/([a-z_]+)\.md\)", text))
-    assert {"index", "install", "adopt", "panel", "quality", "scripting", "troubleshooting", "science"} <= linked
+    assert {"index", "install", "first_blush", "adopt", "panel", "quality", "scripting", "troubleshooting", "science"} <= linked
 
 
 def test_the_sites_settings_fetch_nothing():
