@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import PIL.Image
 import sanguine_core
 from sanguine.app.batch import CONTACT_SHEET, render_batch
 from sanguine.blender.controls import set_controls
@@ -97,7 +98,8 @@ def emotions(out: Path, work: Path) -> None:
             print(f"{head}, {emotion}", file=sys.stderr, flush=True)
     order = [(emotion, head, variant) for emotion in EMOTION_CONTROLS for head in ("female", "male") for variant in VARIANTS]
     captions = [f"{emotion}, {variant}" for emotion, _head, variant in order]
-    sanguine_core.contact_sheet([made[key] for key in order], captions, out / "emotions.jpg", 6, 2)
+    sanguine_core.contact_sheet([made[key] for key in order], captions, work / "sheet.png", 6, 2)
+    PIL.Image.open(work / "sheet.png").convert("RGB").save(out / "emotions.jpg", quality=85)
 
 
 def _plain(material: bpy.types.Material) -> None:

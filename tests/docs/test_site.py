@@ -281,6 +281,20 @@ def test_every_reason_of_a_grey_button_is_explained():
                     assert piece in page, f"docs/troubleshooting.md does not say what to do about {piece!r} ({file.name})"
 
 
+# What only a script meets: names, values and curves that no button asks for.
+_OF_SCRIPTS = ("controls.py", "strain.py")
+
+
+def test_every_refusal_of_blenders_side_is_explained():
+    page = " ".join((DOCS / "troubleshooting.md").read_text(encoding="utf-8").split())
+    for file in sorted((ADDON / "blender").glob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and getattr(node.exc.func, "id", "") == "InputError"):
+                continue
+            for piece in _pieces(_text_of(node.exc.args[0])) if file.name not in _OF_SCRIPTS else ():
+                assert piece in page, f"docs/troubleshooting.md does not say what to do about {piece!r} ({file.name})"
+
+
 def _labels() -> set[str]:
     """Of panels, buttons, menus, properties, items of lists, sliders of the rig."""
     import bpy
