@@ -365,6 +365,15 @@ def test_the_readme_has_two_commands_and_leads_to_the_pages():
     assert {"index", "install", "first_blush", "adopt", "panel", "quality", "scripting", "troubleshooting", "science"} <= linked
 
 
+def _settings() -> dict:
+    return yaml.load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+
+
+def test_no_page_stands_twice_in_the_navigation():
+    pages = list(_load("docs_site")._pages(_settings()["nav"]))
+    assert len(pages) == len(set(pages)), sorted(page for page in pages if pages.count(page) > 1)
+
+
 def test_the_sites_settings_fetch_nothing():
-    settings = yaml.load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    settings = _settings()
     assert settings["theme"]["font"] is False and settings["strict"] is True
