@@ -33,6 +33,10 @@ def registered():
 
 @pytest.fixture(autouse=True)
 def solved_once(monkeypatch):
+    solve_once(monkeypatch)
+
+
+def solve_once(monkeypatch):
     """The same table is solved once: what is tested here is what becomes of it."""
     solve, tables = skin.bake, {}
 

@@ -4,12 +4,16 @@ A new operator needs a row in BUTTONS, which says how it is pressed.
 """
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from hypothesis import settings
+import sanguine
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from sanguine.blender import adopt
@@ -19,7 +23,7 @@ from sanguine.domain.parameters import PARAMETERS
 from support.captures import add, noisy, showing, write_live_link
 from support.inventory import inventory
 from tests.blender.test_addon import draw
-from tests.blender.test_adopt import make_face, registered, same, select, solved_once, with_picture  # noqa: F401
+from tests.blender.test_adopt import make_face, registered, same, select, solve_once, solved_once, with_picture  # noqa: F401
 from tests.blender.test_animation import PROFILE
 from tests.blender.test_panels import scripts  # noqa: F401
 
@@ -176,6 +180,10 @@ def test_one_press_is_one_step_back_and_forth(name, tmp_path, scripts):  # noqa:
         same(after)
 
 
+STATES = []
+"""Of each press, how deep it was."""
+
+
 class Artist(RuleBasedStateMachine):
     """Presses buttons, pulls sliders, saves, changes his mind. `states` is what a step back or forth has to give."""
 
@@ -199,6 +207,7 @@ class Artist(RuleBasedStateMachine):
 
     def step(self):
         settle()
+        STATES.append(self.at)
         self.at += 1
         self.states[self.at :] = [inventory()]
 
@@ -285,12 +294,33 @@ class Artist(RuleBasedStateMachine):
             same(self.start)
 
 
-EXAMPLES = 50
+def play(folder):
+    """50 sequences, in a process of their own: after so many undone states `bpy` hangs when the interpreter ends it."""
+    sanguine.register()
+    Artist.folder = Path(folder)
+    checks = [HealthCheck.too_slow, HealthCheck.filter_too_much]
+    with pytest.MonkeyPatch.context() as patch:
+        solve_once(patch)
+        run_state_machine_as_test(
+            Artist,
+            settings=settings(
+                max_examples=50, stateful_step_count=10, deadline=None, derandomize=True, database=None, suppress_health_check=checks
+            ),
+        )
+    print(len(STATES), "states")
+    sys.stdout.flush()
+    os._exit(0)
 
 
 def test_any_order_of_buttons_and_sliders_is_undone_and_done_again(tmp_path):
-    Artist.folder = tmp_path
-    run_state_machine_as_test(Artist, settings=settings(max_examples=EXAMPLES, stateful_step_count=10))
+    root = Path(__file__).resolve().parents[2]
+    script = (
+        f"import sys; sys.path[:0] = [{str(root / 'tests')!r}, {str(root)!r}]\n"
+        f"from tests.blender.test_undo import play; play({str(tmp_path)!r})"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-8000:]
+    assert int(done.stdout.split()[-2]) > 100, "hardly anything was pressed"
 
 
 def test_panels_draw_in_every_state():
