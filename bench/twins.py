@@ -116,10 +116,23 @@ def measure(shot: Shot, options: argparse.Namespace, name: str) -> list[dict]:
     return rows
 
 
+def table(rows: list[dict]) -> str:
+    """Markdown: a row per skin and expression."""
+    lines = ["| skin | expression | Delta E, nodes: median | 95 % | relief on the film alone: median | 95 % | seconds: OSL | nodes | "
+             "relief on the film alone | Principled, random walk |", "|---|---|" + "---:|" * 8]
+    for row in rows:
+        numbers = [row["delta_e"][kind][key] for kind in (NODES, UNBENT) for key in ("median", "p95")]
+        seconds = [row["seconds"][kind] for kind in (OSL, NODES, UNBENT, STOCK)]
+        cells = [row["skin"], row["expression"], *(f"{n:.3f}" for n in numbers), *(f"{s:.1f}" for s in seconds)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("shot", type=Path)
     parser.add_argument("--out", type=Path, default=Path("bench/results/twins.json"))
+    parser.add_argument("--page", type=Path, default=Path("docs/twins.md"), help="where the table goes")
     parser.add_argument("--size", type=int, nargs=2, default=(256, 320))
     parser.add_argument("--samples", type=int, default=32)
     parser.add_argument("--repeats", type=int, default=3)
@@ -140,6 +153,11 @@ def main() -> None:
     options.out.write_text(json.dumps({
         "blender": bpy.app.version_string, "samples": options.samples, "size": list(options.size), "rows": rows,
     }, indent=1) + "\n")
+    head, rest = options.page.read_text(encoding="utf-8").split("<!-- table -->")
+    said = f"{options.size[0]} x {options.size[1]} pixels, {options.samples} samples, Blender {bpy.app.version_string}."
+    options.page.write_text(
+        f"{head}<!-- table -->\n{table(rows)}\n\n{said}\n<!-- end -->{rest.split('<!-- end -->')[1]}", encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

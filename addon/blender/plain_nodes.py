@@ -37,16 +37,11 @@ Table = Callable[[str, np.ndarray], bpy.types.Image]
 """Makes an image of numbers, (1, width, channels), by name."""
 
 
-def plain_node(
-    tree: bpy.types.NodeTree, name: str, graph: Graph, data_image: Table, bend_scattering: bool = True
-) -> bpy.types.Node:
-    """A group node that computes what the OSL of `graph` does. bend_scattering: the normal of light under the skin too.
-
-    Raises Untranslatable for what Blender has no node for.
-    """
+def plain_node(tree: bpy.types.NodeTree, name: str, graph: Graph, data_image: Table) -> bpy.types.Node:
+    """A group node that computes what the OSL of `graph` does. Raises Untranslatable for what Blender has no node for."""
     group = bpy.data.node_groups.new(name, "ShaderNodeTree")
     try:
-        _Emitter(name, group, graph, data_image, bend_scattering).emit()
+        _Emitter(name, group, graph, data_image).emit()
     except BaseException:
         bpy.data.node_groups.remove(group)
         raise
@@ -57,9 +52,8 @@ def plain_node(
 
 
 class _Emitter:
-    def __init__(self, name: str, tree: bpy.types.NodeTree, graph: Graph, data_image: Table, bend_scattering: bool) -> None:
+    def __init__(self, name: str, tree: bpy.types.NodeTree, graph: Graph, data_image: Table) -> None:
         self.name, self.tree, self.graph, self.data_image = name, tree, graph, data_image
-        self.bend_scattering = bend_scattering
         self.begin = tree.nodes.new("NodeGroupInput")
         self.sockets: dict[Op, bpy.types.NodeSocket] = {}
         self.split: dict[Op, bpy.types.Node] = {}
@@ -328,7 +322,7 @@ class _Emitter:
             made.falloff = methods[method]
             made.inputs["Scale"].default_value = 1.0
             self.put(radius, made.inputs["Radius"])
-            self.put_normal(normal, made, self.bend_scattering)
+            self.put_normal(normal, made)
             for name, value in zip(names, named, strict=True):
                 self.put(value, made.inputs[_WALK[name]])
             return made
@@ -399,15 +393,15 @@ class _Emitter:
         root = self.node("ShaderNodeMath", "SQRT", "roughness")  # OSL's is the width of the facets' slopes
         self.put(roughness, root.inputs[0])
         self.tree.links.new(root.outputs[0], node.inputs["Roughness"])
-        self.put_normal(normal, node, True)
+        self.put_normal(normal, node)
         if weight.kind == "const":
             if weight.value == 1.0:
                 return node.outputs[0]
             raise Untranslatable(f"{self.name}: dielectric_bsdf times a constant")
         return self.mixed(self.socket(weight), node.outputs[0])
 
-    def put_normal(self, normal: Op, node: bpy.types.Node, wanted: bool) -> None:
-        if wanted and normal.kind != "normal":
+    def put_normal(self, normal: Op, node: bpy.types.Node) -> None:
+        if normal.kind != "normal":
             self.put(normal, node.inputs["Normal"])
 
     def missing(self, op: Op) -> Untranslatable:
