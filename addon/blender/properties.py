@@ -91,7 +91,7 @@ def _skin_properties() -> dict[str, object]:
         name="Material",
         description="What the skin's material is made of when it is applied: the same skin either way",
         items=[
-            (AUTO, "Automatic", "OSL where this Blender's Cycles runs it on the scene's device, else plain nodes"),
+            (AUTO, "Automatic", "Plain nodes: the picture that OSL gives, in less time, on every device and in EEVEE"),
             (OSL, "OSL", "Two or three short scripts that a person can read. Cycles alone shows them, on the CPU and OptiX"),
             (NODES, "Plain Nodes", "What the scripts compute, as Blender's own nodes: every device, EEVEE, every Blender"),
         ],

@@ -57,7 +57,7 @@ def assemble(plan: Plan) -> dict[str, Shader]:
         "surface": _assemble(
             "surface",
             plan.fragments,
-            {"LOBES": plan.settings.lobes, "SLICES": len(table_slices(axes)), "RELIEF": int("relief" in stages)},
+            {"LOBES": plan.settings.lobes, "SLICES": len(table_slices(axes)), "RELIEF": 0},
             lobes=_lobe_inputs(plan),
         ),
     }

@@ -1,8 +1,8 @@
 """The effects, each declared in its module and listed here once, in the order in which they act."""
 
 from . import (
-    anatomy, grown, mottle, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map, strain,
-    thin, wrinkles,
+    anatomy, diffuse_relief, grown, mottle, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map,
+    strain, thin, wrinkles,
 )
 from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
@@ -18,6 +18,7 @@ EFFECTS: tuple[Effect, ...] = (
     pressure.EFFECT,
     relief.EFFECT,
     wrinkles.EFFECT,
+    diffuse_relief.EFFECT,
     thin.EFFECT,
     residual.EFFECT,  # after the walk, whose light it colours too
     oil.EFFECT,  # after the residual: the film lies over brows and make-up too

@@ -48,6 +48,16 @@ def written(scene: Scene) -> frozenset[str]:
     return frozenset(change["channel"] for row in active for change in row["changes"])
 
 
+def has_height(scene: Scene) -> bool:
+    """Whether a feature, grown or brought out by a state, shapes the surface."""
+    return any(
+        change["channel"] == "height_mm"
+        for name, row in ROWS.items()
+        if scene.strengths.get(name, 0.0) > 0.0 or name in keyed(scene)
+        for change in row["changes"]
+    )
+
+
 def channels_of(name: str) -> tuple[str, ...] | None:
     """What the channels of a painted map hold; None of any other map."""
     if name.startswith(_KEYED):
