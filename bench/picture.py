@@ -62,11 +62,12 @@ JUDGED = ("patch", "edge", "sphere", "mapped", "live table")
 # `final` and `reference` keep the whole material besides: what these scenes do not show is held by tests at those
 # settings alone (the fall-off of very dark skin within 10 %, the planner's table within Delta E 0.3).
 PRESET_RULE = {"draft": 3.0, "preview": 2.5, "final": 1.5, "reference": 1.05}
-WHOLE = ("final", "reference")
+# Preset -> lobes at least. Two hold the fall-off (tests/render/test_falloff.py), and a lobe costs look-ups and sampling.
+WHOLE = {"final": 2, "reference": 4}
 
 
-def is_whole(s: Settings) -> bool:
-    return s.lobes == USUAL.lobes and s.table_step <= USUAL.table_step and s.map_size >= USUAL.map_size
+def is_whole(s: Settings, lobes: int) -> bool:
+    return s.lobes >= lobes and s.table_step <= USUAL.table_step and s.map_size >= USUAL.map_size
 
 
 TIMES = ("core_seconds_per_megasample", "denoise_core_seconds_per_megapixel", "prepare_core_seconds")
@@ -384,7 +385,8 @@ def _points(results: dict[str, Any], mapped: Any) -> list[dict[str, Any]]:
                     error = judged(s, "p95") + added("table", "table_step", step) + added("maps", "map_size", size)
                     candidates.append((seconds_of(results, s), error, s))
     chosen = front(candidates)
-    chosen += [s for s in front([c for c in candidates if is_whole(c[2])]) if s not in chosen]
+    for lobes in WHOLE.values():
+        chosen += [s for s in front([c for c in candidates if is_whole(c[2], lobes)]) if s not in chosen]
     measured = []
     for s in chosen:
         rows = [mapped(skin, s) for skin in SKINS]
@@ -403,10 +405,10 @@ def _points(results: dict[str, Any], mapped: Any) -> list[dict[str, Any]]:
 
 def choose(points: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """THE RULE applied: preset -> point."""
-    whole = [p for p in points if is_whole(Settings(**{key: p[key] for key in Settings.model_fields}))]
+    settings = [Settings(**{key: p[key] for key in Settings.model_fields}) for p in points]
     chosen = {}
     for name, times in PRESET_RULE.items():
-        open_to = whole if name in WHOLE else points
+        open_to = [p for p, s in zip(points, settings, strict=True) if name not in WHOLE or is_whole(s, WHOLE[name])]
         least = min(p["delta_e"] for p in open_to)
         chosen[name] = min((p for p in open_to if p["delta_e"] <= times * least), key=lambda p: p["core_seconds"])
     return chosen

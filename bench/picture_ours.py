@@ -22,6 +22,7 @@ from sanguine.domain.effects.regions import FACE_REGIONS
 from sanguine.domain.parameters import Skin, skin_rows
 from sanguine.domain.plan import Plan, check_strengths, make_plan
 from sanguine.domain.quality import Settings
+from sanguine.domain.shading import NODES
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from support.patch import empty_scene, render_linear, white_world  # noqa: E402
@@ -47,7 +48,7 @@ class Shot:
 def skin_material(skin: Skin, lobes: int) -> bpy.types.Material:
     """Sanguine's material of a skin without effects."""
     settings = Settings(lobes=lobes, table_step=1.0, map_size=1024, samples=1)
-    return build_skin_material("skin", make_plan(Scene(skin, (Frame("0"),)), settings), {})
+    return build_skin_material("skin", make_plan(Scene(skin, (Frame("0"),)), settings), {}, shading=NODES)
 
 
 def mapped_plan(skin: Skin, settings: Settings) -> Plan:
@@ -86,7 +87,7 @@ def mapped_material(skin: Skin, settings: Settings) -> bpy.types.Material:
     at = ((np.arange(texels) + 0.5) / texels - 0.5) * MAPPED_MM
     maps = {name: np.zeros((4, 4, 3), dtype=np.float32) for name in plan.maps}  # blood stays at rest
     maps[anatomy.MAP] = mapped_factors(at[None, :], at[:, None]).astype(np.float32)
-    return build_skin_material("mapped", plan, maps)
+    return build_skin_material("mapped", plan, maps, shading=NODES)
 
 
 def mapped_truth_xyz(skin: Skin, fine: int = 3) -> np.ndarray:
@@ -174,6 +175,7 @@ def build(scene_id: str, material: Material, samples: int, width: int = 0, heigh
         columns, rows, width_mm = *it.picture_size, it.width_mm
     scene = empty_scene(width or columns, height or rows, samples)
     scene.unit_settings.scale_length = 0.001
+    scene.cycles.shading_system = False  # plain nodes, as skins are made unless OSL is asked for
     scene.render.threads_mode, scene.render.threads = "FIXED", 1  # processor time without waiting for each other
     scene.cycles.pixel_filter_type = "BOX"  # a pixel sees its own square alone
     world = bpy.data.worlds.new("black")
