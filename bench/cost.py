@@ -45,7 +45,7 @@ BAR = 0.7
 STOCK, STOCK_MAPS = "Principled, one colour", "Principled, its maps"
 SANGUINE = {OSL: "Sanguine, OSL", NODES: "Sanguine, plain nodes"}
 BLOOD = "Sanguine, plain nodes, what every skin has"
-DIFFUSE = "Sanguine, plain nodes, with diffuse relief"
+SMOOTH = "Sanguine, plain nodes, no diffuse relief"
 # What a skin has when nobody asked for more.
 DEFAULT = ("scattering", "anatomy", "perfusion", "oxygenation", "oil")
 
@@ -238,7 +238,7 @@ Seconds of the skin alone with one effect more than what every skin has, and the
 
 An effect that is off has no node and no line: its row is then the first one's. Differences under a tenth of a second are noise.
 
-OSL costs more because Cycles takes every OSL material to bend its normals and runs all of it a second time wherever light leaves the skin. Plain nodes are run again only with *Diffuse relief* (a row of the first table).
+OSL costs more because Cycles takes every OSL material to bend its normals and runs all of it a second time wherever light leaves the skin. Plain nodes are run again only with *Diffuse relief*, the price of the first table's rows with and without it; the effects above are without.
 """
 
 
@@ -260,13 +260,13 @@ def main() -> None:
     # The whole skin is the last that is applied: the blood's properties are of the last one.
     stage.add_sanguine(BLOOD, make_plan(replace(plan.scene, switched_off=frozenset(
         effect.id for effect in plan.active if effect.id not in DEFAULT)), plan.settings), NODES)
-    stage.add_sanguine(DIFFUSE, with_strengths(plan, diffuse_relief=1.0), NODES)
+    stage.add_sanguine(SMOOTH, with_strengths(plan, diffuse_relief=0.0), NODES)
     for shading in (OSL, NODES):
         stage.add_sanguine(SANGUINE[shading], plan, shading)
     skin = skin_from(subject.skin, "skin")
     stage.add(STOCK, stock_skin(skin), False)
     stage.add(STOCK_MAPS, artists_skin(stage, skin), False)
-    names = [STOCK, STOCK_MAPS, BLOOD, SANGUINE[NODES], DIFFUSE, SANGUINE[OSL]]
+    names = [STOCK, STOCK_MAPS, BLOOD, SMOOTH, SANGUINE[NODES], SANGUINE[OSL]]
     results: dict[str, Any] = {
         "machine": platform.machine(), "blender": bpy.app.version_string, "rounds": options.rounds,
         "quality": plan.settings.model_dump(), "seconds": {}, "noise": {}, "effects": {},
@@ -279,7 +279,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         results["noise"] = {name: noise(stage, name, Path(folder)) for name in names}
-    richer = with_strengths(plan, mottle=1.0)
+    richer = with_strengths(plan, mottle=1.0, diffuse_relief=0.0)
     for shading in (NODES, OSL):
         of = effects_alone(stage, richer, shading)
         taken = timed(stage, list(of.values()), options.rounds)

@@ -152,7 +152,7 @@ def test_a_residual_multiplies_and_never_makes_light():
 def test_height_bends_the_light(monkeypatch):
     """Waves of 0.1 mm under a low sun are bands of light; a height that is the same everywhere is no relief."""
     declare(monkeypatch, "bumpy", height_mm=(-0.1, 0.1))
-    plan = plan_of(strengths={"bumpy": 1.0})
+    plan = plan_of(strengths={"bumpy": 1.0, "diffuse_relief": 1.0})
 
     def spread(height):
         def material():

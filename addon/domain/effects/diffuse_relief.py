@@ -29,5 +29,5 @@ EFFECT = Effect(
             defines={"RELIEF": "1"},
         ),
     ),
-    default_strength=0.0,
+    default_strength=1.0,
 )
