@@ -58,6 +58,7 @@ def with_skin(target: str) -> None:
     bpy.context.view_layer.objects.active = face.skin
     face.skin.select_set(True)
     face.skin.sanguine.quality = "draft"
+    face.skin.sanguine.shading = "OSL"  # which the Blender of the window has not
     assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
     bone = face.rig.pose.bones["sanguine"]
     for frame, value in KEYS.items():
