@@ -68,6 +68,7 @@ bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (three quarte
 	$(PY) bench/scrubbing.py
 	$(PY) bench/feature_pictures.py --only times
 	$(PY) bench/picture.py
+	$(PY) tools/write_docs_tables.py
 
 setup: system $(RUN_STAMP) $(NATIVE_STAMP) $(ADDON_STAMP) ## Install everything that demo needs, render nothing
 
