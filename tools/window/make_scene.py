@@ -60,6 +60,7 @@ def with_skin(target: str) -> None:
     face.skin.sanguine.quality = "draft"
     face.skin.sanguine.shading = "OSL"  # which the Blender of the window has not
     assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
+    face.skin.sanguine.property_unset("shading")
     bone = face.rig.pose.bones["sanguine"]
     for frame, value in KEYS.items():
         bone["anger"] = value
