@@ -38,8 +38,8 @@ POSE = "anger"
 PIXELS = (128, 160)
 SAMPLES = 32
 FEW = 2
-# Of the converged pictures: their own mean square error is 1/32 of that of the pictures that are judged.
-CONVERGED = 1024
+# Of the converged pictures: their own mean square error is 1/16 of that of the pictures that are judged.
+CONVERGED = 512
 BAR = 0.7
 
 STOCK, STOCK_MAPS = "Principled, one colour", "Principled, its maps"

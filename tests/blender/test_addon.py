@@ -10,14 +10,6 @@ from sanguine.domain.quality import DEFAULT, PRESETS
 from tests.blender.layouts import draw
 
 
-@pytest.fixture
-def addon():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    sanguine.register()
-    yield
-    sanguine.unregister()
-
-
 def grid(regions=FACE_REGIONS):
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=0.2)
     face = bpy.context.object

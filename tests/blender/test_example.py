@@ -6,14 +6,6 @@ import sanguine
 from sanguine.blender import example
 
 
-@pytest.fixture
-def addon():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    sanguine.register()
-    yield
-    sanguine.unregister()
-
-
 def test_two_heads_stand_where_the_cursor_was_and_share_no_mesh(addon):
     places = ((0.0, 0.0, 0.0), (0.5, 0.0, 1.0))
     faces = []

@@ -5,7 +5,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-import sanguine
 from sanguine.blender import migration
 from sanguine.blender.skin import VERSION
 from sanguine.domain.errors import InputError
@@ -17,12 +16,7 @@ from tests.blender.test_addon import draw, grid
 OLD = Path(__file__).resolve().parents[1] / "data" / "version_1.blend"
 
 
-@pytest.fixture(autouse=True)
-def addon():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    sanguine.register()
-    yield
-    sanguine.unregister()
+pytestmark = pytest.mark.usefixtures("addon")
 
 
 @pytest.fixture

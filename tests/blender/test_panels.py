@@ -27,14 +27,6 @@ NAMES = {panel.__name__.removeprefix("SANGUINE_PT_material_").removeprefix("SANG
 
 
 @pytest.fixture
-def addon():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    sanguine.register()
-    yield
-    sanguine.unregister()
-
-
-@pytest.fixture
 def face(addon):
     made = grid()
     made.sanguine.quality = "draft"
