@@ -66,6 +66,7 @@ bench: setup $(BENCH_STAMP) ## Measure what accuracy costs in time (three quarte
 	$(PY) bench/blood_colour.py --extremes
 	$(PY) bench/emotion_in_time.py
 	$(PY) bench/scrubbing.py
+	$(PY) bench/cost.py
 	$(PY) bench/feature_pictures.py --only times
 	$(PY) bench/picture.py
 	$(PY) tools/write_docs_tables.py

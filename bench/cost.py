@@ -199,6 +199,11 @@ def with_strengths(plan: Plan, **strengths: float) -> Plan:
     return make_plan(replace(plan.scene, strengths={**plan.scene.strengths, **strengths}), plan.settings)
 
 
+def met(results: dict[str, Any]) -> bool:
+    """Whether the whole skin takes at most BAR of the time of Principled with its maps."""
+    return all(place[SANGUINE[NODES]] <= BAR * place[STOCK_MAPS] for place in results["seconds"].values())
+
+
 def page(results: dict[str, Any]) -> str:
     seconds, noise_of, effects = results["seconds"], results["noise"], results["effects"]
     alone = seconds["skin alone"]
@@ -225,7 +230,7 @@ The head of `examples/five_expressions.toml` with all its maps, in anger, {PIXEL
 
 **Principled, one colour** is a Principled BSDF with random walk in the skin's colour, nothing else. **Principled, its maps** is what an artist makes of it: the same skin's colours as a baked map, pores as a bump. **What every skin has** is ours without features, strain and relief; the others have all that the shot asks for, which Principled cannot show: blood by region and by strain, wrinkles that form, fine lines.
 
-The bar was {BAR}: ratios to Principled in the columns "/ one colour" and "/ maps".
+The bar is {BAR} of Principled, {"which is met" if met(results) else "and **it is not met**"}: ratios to Principled in the columns "/ one colour" and "/ maps".
 
 {table(["material", "portrait", "/ one colour", "/ maps", "skin alone", "/ one colour", "/ maps", "relative noise", "noise at equal time"], rows)}
 
@@ -238,7 +243,7 @@ Seconds of the skin alone with one effect more than what every skin has, and the
 
 An effect that is off has no node and no line: its row is then the first one's. Differences under a tenth of a second are noise.
 
-OSL costs more because Cycles takes every OSL material to bend its normals and runs all of it a second time wherever light leaves the skin. Plain nodes are run again only with *Diffuse relief*, the price of the first table's rows with and without it; the effects above are without.
+With *Diffuse relief* (on unless switched off) Cycles runs the whole material a second time where light leaves the skin: that is the difference of the first table's rows with and without it. The effects above are without. What costs most are the noises of *Mottle* and *Relief*, computed anew at every sample, and that a bump is computed three times for its slope.
 """
 
 
