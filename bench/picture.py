@@ -33,7 +33,7 @@ from picture_scenes import (  # noqa: E402
 from sanguine.domain.effects import Frame, Scene  # noqa: E402
 from sanguine.domain.effects.regions import FACE_REGIONS  # noqa: E402
 from sanguine.domain.facs import EMOTION_CONTROLS  # noqa: E402
-from sanguine.domain.lut import bake  # noqa: E402
+from sanguine.domain.lut import bake, layout  # noqa: E402
 from sanguine.domain.parameters import skin_rows  # noqa: E402
 from sanguine.domain.plan import check_strengths, make_plan  # noqa: E402
 from sanguine.domain.quality import Settings  # noqa: E402
@@ -280,13 +280,14 @@ def live_table(table_step: float, count: int = 1000) -> dict[str, Any]:
               FACE_REGIONS, live=True),
         USUAL.model_copy(update={"table_step": table_step}))
     table = bake(plan.axes, plan.scene.skin, "rec709")
-    counts = [axis.count for axis in plan.axes]
-    colours = table.image.reshape(2, table.lobes, *counts[:0:-1], counts[0], 3)[0].sum(0)
-    t = np.random.default_rng(1).random((count, len(counts)))
+    form = layout(plan.axes)
+    colours = table.image.reshape(form.levels, form.rows, 2 * table.lobes, form.columns, 3)[:, :, : table.lobes].sum(2)
+    t = np.random.default_rng(1).random((count, len(plan.axes)))
     rows = np.repeat(skin_rows([plan.scene.skin]), count, axis=0)
     for axis, x in zip(plan.axes, t.T, strict=True):
         rows[:, list(plan.scene.skin).index(axis.id)] = [axis.value(t) for t in x]
-    grid = [np.linspace(0.0, 1.0, n) for n in reversed(counts)]
+    t[:, 2] = np.round(t[:, 2] * (form.levels - 1)) / (form.levels - 1)  # the nearest level of oxygenation, as the shader reads
+    grid = [np.linspace(0.0, 1.0, n) for n in (form.levels, form.rows, form.columns)]
     between = RegularGridInterpolator(grid, colours.astype(float))(t[:, ::-1])
     nm = np.arange(380.0, 781.0, 5.0)
     exact = sanguine_core.xyz(sanguine_core.reflectance(rows, nm), nm) / 100.0
