@@ -78,9 +78,9 @@ def test_no_border_shows_where_a_walk_takes_over(name, tilt, shading):
 
 @pytest.mark.parametrize("albedo", [0.1, 0.4, 0.8])
 def test_the_walk_is_as_bright_as_the_curve_says(albedo):
-    """`albedo_in_walk` against Cycles, from above and aslant: 1.5 %, of which 0.5 % is noise."""
+    """`albedo_in_walk` against Cycles, from above and aslant: 0.5 %, twice what 4096 samples leave (256 leave 2 %)."""
     for tilt in (0.0, 1.1):
-        scene = empty_scene(16, 16, 256)
+        scene = empty_scene(16, 16, 4096)
         white_world(scene)
         material = bpy.data.materials.new("walk")
         if not material.node_tree:
@@ -94,7 +94,7 @@ shader walk(output closure color BSDF = 0) {{
         tree.links.new(node.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
         thing([(-0.2, -0.2, 0), (0.2, -0.2, 0), (0.2, 0.2, 0), (-0.2, 0.2, 0)], [(0, 1, 2, 3)], material, [1.0] * 4)
         camera(0.02, tilt)
-        assert render_linear().mean() == pytest.approx(walk.albedo_in_walk(albedo, math.cos(tilt)), rel=0.015)
+        assert render_linear().mean() == pytest.approx(walk.albedo_in_walk(albedo, math.cos(tilt)), rel=0.005)
 
 
 @pytest.mark.parametrize("thickness_mm", [1.5, 3.0])
