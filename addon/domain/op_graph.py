@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .head.surface import smoothstep
 
 
 class Untranslatable(InputError):
@@ -79,11 +80,6 @@ def _safe_divide(a: Any, b: Any) -> Any:
     return np.where(b == 0.0, 0.0, np.asarray(a, dtype=float) / np.where(b == 0.0, 1.0, b))
 
 
-def _smoothstep(low: Any, high: Any, x: Any) -> Any:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
-
-
 def _normalize(v: Any) -> Any:
     return _safe_divide(v, np.linalg.norm(v, axis=-1, keepdims=True))
 
@@ -99,7 +95,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sin": np.sin, "cos": np.cos, "tan": np.tan,
     "clamp": lambda x, low, high: np.minimum(np.maximum(x, low), high),
     "mix": lambda a, b, t: a * (1.0 - t) + b * t,
-    "smoothstep": _smoothstep,
+    "smoothstep": smoothstep,
     "select": lambda c, a, b: np.where(c != 0.0, a, b),
     # Of vectors: the last axis has their three numbers.
     "scale": lambda v, f: v * np.asarray(f)[..., None],

@@ -225,7 +225,7 @@ class Image(_Table):
     samples: Annotated[int, pydantic.Field(ge=1, le=65536)] | None = None
     denoise: bool = True
     view_transform: str = ""
-    # What the skins are made of; "auto": what renders here.
+    # What the skins are made of; "auto": plain nodes.
     material: Literal["auto", "osl", "nodes"] = "auto"
     seed: Annotated[int, pydantic.Field(ge=0, le=2_147_483_647)] = 0
 

@@ -50,10 +50,11 @@ def written(scene: Scene) -> frozenset[str]:
 
 def has_height(scene: Scene) -> bool:
     """Whether a feature, grown or brought out by a state, shapes the surface."""
+    brought_out = keyed(scene)
     return any(
         change["channel"] == "height_mm"
         for name, row in ROWS.items()
-        if scene.strengths.get(name, 0.0) > 0.0 or name in keyed(scene)
+        if scene.strengths.get(name, 0.0) > 0.0 or name in brought_out
         for change in row["changes"]
     )
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .. import walk
+from ..head.surface import smoothstep
 from .effect import Activation, Effect, Fragment, Scene, ShaderInput, strength_activation
 
 ATTRIBUTE = "sanguine_thin"
@@ -45,14 +46,12 @@ SKY = _directions(((18.0, 6), (41.0, 12), (66.0, 12)))
 
 def thinness(thickness_mm: np.ndarray) -> np.ndarray:
     """1 up to FULL_MM, 0 from GONE_MM on, smooth between."""
-    t = np.clip((GONE_MM - np.asarray(thickness_mm, dtype=float)) / (GONE_MM - FULL_MM), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
+    return 1.0 - smoothstep(FULL_MM, GONE_MM, np.asarray(thickness_mm, dtype=float))
 
 
 def lit_share(open_to: np.ndarray) -> np.ndarray:
     """1 where the share of directions that are open lets light in, 0 where it does not, smooth between."""
-    t = np.clip((np.asarray(open_to) - OPEN[0]) / (OPEN[1] - OPEN[0]), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
+    return smoothstep(*OPEN, np.asarray(open_to))
 
 
 def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
