@@ -11,7 +11,7 @@ from ..domain.errors import InputError, nearest
 from .bake import RECORD, bake_blood, bake_state
 from .blood import blood_properties
 from .colour import follow_working_space, strange_images
-from .migration import newer
+from .migration import bring_up_to_date, newer
 from .operators import controls_of, emotion_bone
 from .osl import has_scripts, missing_osl
 from .render import quiet, save_render
@@ -49,12 +49,28 @@ class SceneFile:
         return range(self.scene.frame_start, self.scene.frame_end + 1, self.scene.frame_step)
 
     def prepare(self, progress: Callable[[int, int], bool] | None = None) -> list[str]:
-        """Solves the tables that were made for another working space than the file's. Returns what was done, a line each."""
+        """Brings faces of older versions up to date and solves the tables that were made for another working space than the
+        file's. Returns what was done, a line each.
+
+        A skin stays as it was made: a farm renders what the artist saw, and a new one may look a little different.
+        """
+        aged = self._bring_up_to_date()
         strange = strange_images()
         notes = follow_working_space(strange, progress)
         if len(strange) > len(notes):
             notes.append(f"{len(strange) - len(notes)} skins solved for the file's working space, which has changed since")
-        return notes
+        return aged + notes
+
+    def _bring_up_to_date(self) -> list[str]:
+        lines = []
+        for face in self.scene.objects:
+            if face.type != "MESH" or face.library is not None:
+                continue
+            if why := newer(face):
+                lines.append(f"{why}; its skin stays as it is")
+            elif done := bring_up_to_date(face):
+                lines.append(f"{done[0]}: its settings are brought up to date, its skin stays as it was made until Apply Skin")
+        return lines
 
     def stale(self) -> dict[str, str]:
         """Face -> why its blood is not what the animation asks for; "" where it is."""

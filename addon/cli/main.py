@@ -513,7 +513,7 @@ def _render_scene(options: argparse.Namespace, only: list[str] | None) -> int:
     with reporter(options.json_progress) as progress:
         notes = render_file(scene, options.shot, options.out, only, options.resume, progress)
     for note in notes:
-        print(f"sanguine: {options.shot}: {note}", file=sys.stderr)
+        print(f"sanguine: {options.shot}: {note} (in memory alone: the file is not written)", file=sys.stderr)
     return 0
 
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import bpy
 import pytest
@@ -91,6 +92,28 @@ def test_a_render_bakes_first_and_resumes(scene, tmp_path):
     assert run("render", scene, "--out", tmp_path / "one", "--only", "000025").returncode == 0
     alone, in_sequence = (sanguine_core.read_image(str(folder / "000025.exr")) for folder in (tmp_path / "one", out))
     assert (alone == in_sequence).all()
+
+
+def test_an_older_file_is_rendered_as_it_looks_and_not_written(tmp_path):
+    old = Path(__file__).resolve().parents[1] / "data" / "version_1.blend"
+    before = old.read_bytes()
+    done = run("render", old, "--out", tmp_path / "old", "--only", "000001,000010")
+    assert done.returncode == 0, done.stderr
+    said = [line for line in done.stderr.splitlines() if "older Sanguine" in line]
+    assert len(said) == 1 and "version 1" in said[0] and "until Apply Skin" in said[0] and "not written" in said[0]
+    assert old.read_bytes() == before
+    first, last = (sanguine_core.read_image(str(tmp_path / "old" / f"{name}.exr")) for name in ("000001", "000010"))
+    skin = last.max(2) < 0.95  # the world behind it is white
+    red, green, blue = last[skin].mean(0) / first[skin].mean(0)
+    # Ten frames after the key blood has come a little way: it took 0.6 % of red, 1.0 % of green and 1.3 % of blue. The
+    # samples are the same ones, and a change of shape alone would take the same share of all three.
+    assert green < red - 0.002 and blue < red - 0.002, "anger is keyed, and the old skin follows its blood"
+
+    saved = tmp_path / "saved.blend"
+    assert "older Sanguine" in run("bake", old, "--save", saved).stderr
+    done = run("render", saved, "--out", tmp_path / "new", "--only", "000010")
+    assert done.returncode == 0 and "older" not in done.stderr, done.stderr
+    assert (sanguine_core.read_image(str(tmp_path / "new" / "000010.exr")) == last).all(), "the same skin"
 
 
 @pytest.mark.parametrize(
