@@ -38,8 +38,7 @@ def sliders(*groups: str) -> str:
     rows = []
     for row in PARAMETERS.values():
         if row.group in groups:
-            unit = "" if row.unit in ("", "1") else f" {row.unit}"
-            rows.append((f"**{row.label}**", f"{row.default:g}{unit}", f"{row.soft_min:g} to {row.soft_max:g}", f"{row.help}."))
+            rows.append((f"**{row.caption}**", f"{row.default:g}", f"{row.soft_min:g} to {row.soft_max:g}", f"{row.help}."))
     for effect in EFFECTS:
         if effect.default_strength is not None and effect.group in groups:
             rows.append((f"**{effect.label}**", f"{effect.default_strength:g}", "0 to 1", _first(effect.help)))

@@ -275,6 +275,8 @@ def _slider_label(bone: bpy.types.PoseBone, name: str) -> str:
         return "Blood (exaggerated)"
     if name == PACE_CONTROL and bone[name] > 1.0:
         return "Blood pace (hurried)"
+    if name == HEART_RATE_CONTROL:
+        return "Heart rate (per minute)"
     rows = {**STATES, **OPTIONAL}
     return rows[name].label if name in rows else name.replace("_", " ").capitalize()
 
@@ -288,7 +290,7 @@ class SANGUINE_PT_time(_RigPart):
         layout, rig = self.layout, rig_of(context)
         state = bake_state(active_face(context), rig, context.scene)
         if not state.baked:
-            layout.label(text="Settled: not in time yet", icon="INFO")
+            _wrapped(layout, context, "Blood is shown as it would settle. Bake Blood makes it follow in time", "INFO")
         elif state.stale:
             layout.label(text="Stale: bake again", icon="ERROR")
             _wrapped(layout, context, state.stale)

@@ -29,7 +29,7 @@ def _skin_properties() -> dict[str, object]:
     for row in PARAMETERS.values():
         unit = "a share of 1" if row.unit in ("", "1") else row.unit
         made[row.id] = bpy.props.FloatProperty(
-            name=row.label,
+            name=row.caption,
             description=f"{row.help}. {row.hard_min:g} to {row.hard_max:g}, in {unit}. Source: {row.source}",
             default=row.default,
             min=row.hard_min,
@@ -110,7 +110,7 @@ def _growth_properties() -> dict[str, object]:
             default=default.seed, min=SEEDS[0], max=SEEDS[1], **common,
         ),
         "age_years": bpy.props.FloatProperty(
-            name="Age", description="Years: spots and small vessels grow with them", default=default.age_years, min=AGES[0],
+            name="Age (years)", description="Years: spots and small vessels grow with them", default=default.age_years, min=AGES[0],
             max=AGES[1], soft_min=15.0, soft_max=90.0, precision=0, step=100, **common,
         ),
         "sun": bpy.props.FloatProperty(

@@ -30,6 +30,12 @@ class Parameter:
     help: str
     source: str
 
+    @property
+    def caption(self) -> str:
+        """The label of a slider: with the unit, where it has one. Blender's own units of length are the scene's, of which a
+        hundredth of a millimetre is too little."""
+        return self.label if self.unit in ("", "1") else f"{self.label} ({self.unit})"
+
 
 def _rows(rows: list[dict[str, Any]]) -> dict[str, Parameter]:
     return {row["id"]: Parameter(**{k: row[k] for k in Parameter.__dataclass_fields__}) for row in rows}

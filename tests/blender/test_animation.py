@@ -66,7 +66,7 @@ def test_baking_shows_in_the_panel_whether_it_holds(face):
     bpy.ops.sanguine.apply_skin()
     bpy.context.scene.frame_end = 48
     key(face, "anger", f1=0.0, f12=1.0)
-    assert any("Settled" in line for line in draw(panels.SANGUINE_PT_time))
+    assert any("settle" in line for line in draw(panels.SANGUINE_PT_time))
     assert bpy.ops.sanguine.bake_blood() == {"FINISHED"}
     assert RECORD in face and "Baked" in draw(panels.SANGUINE_PT_time)
     assert len(curves(face)) >= 6

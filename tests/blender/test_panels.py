@@ -11,16 +11,18 @@ import pytest
 import sanguine
 from sanguine.app import swatch as colours
 from sanguine.blender import panels, plan_view, presets, swatch
-from sanguine.blender.controls import add_controls
+from sanguine.blender.controls import OPTIONAL, add_controls
 from sanguine.blender.material import MARK
 from sanguine.blender.operators import emotion_bone, live_plan
 from sanguine.blender.properties import VIEWS, point_of, skin_of, slider_of, switch_property
+from sanguine.domain.blood import MOOD_SUFFIX, STATES
 from sanguine.domain.effects import EFFECTS
+from sanguine.domain.facs import EMOTION_CONTROLS
 from sanguine.domain.parameters import PARAMETERS
 from sanguine.domain.quality import BEST_DELTA_E, POINTS, PRESETS, WITHIN
 from sanguine.domain.resources import rigs_path
 from sanguine.domain.skin_preset import FORMAT, read_preset
-from tests.blender.layouts import draw
+from tests.blender.layouts import SIDEBAR, SLIDER, Layout, draw, lay_out, pixels
 from tests.blender.test_addon import grid
 
 NAMES = {panel.__name__.removeprefix("SANGUINE_PT_material_").removeprefix("SANGUINE_PT_") for panel in panels.CLASSES}
@@ -617,12 +619,43 @@ def test_removing_takes_the_headline_too_and_gives_the_settings_back(addon):
     assert face.sanguine.melanin == pytest.approx(0.2) and face.sanguine.use_oil and face.sanguine.last_emotion == ""
 
 
-def test_texts_fit_a_narrow_panel(face):
-    """Labels that are not wrapped have at most 38 letters, what 320 pixels show at a scale of 1 beside an icon."""
+def test_no_text_is_cut_in_the_sidebar_as_blender_opens_it(face):
+    """With all that a rig can have on it, and in every state of the blood. Widths by Blender's own font."""
+    add_controls(face.parent, EMOTION_CONTROLS, (*STATES, *OPTIONAL))
+    add_controls(face.parent, states=[name + MOOD_SUFFIX for name in EMOTION_CONTROLS])
     face.sanguine.quality = WITHIN
-    for name, drawn in draw_all().items():
-        for text in drawn:
-            assert len(text) <= 44 or "_" in text, (name, text)
+    bpy.context.scene.frame_end = 3
+    for state in ("settled", "baked", "stale"):
+        if state == "baked":
+            bpy.ops.sanguine.bake_blood()
+        elif state == "stale":
+            emotion_bone(face)["blood"], emotion_bone(face)["blood_pace"] = 2.0, 4.0
+        for panel in panels.CLASSES:
+            if panel.bl_space_type == "VIEW_3D" and (layout := lay_out(panel, SIDEBAR)) is not None:
+                assert layout.too_wide() == [], panel.__name__
+
+
+def test_a_text_that_is_too_long_is_seen():
+    """As on the screen: this one was cut, the other stood whole."""
+    for name, cut in (("11 Nasolabial Furrow Deepener", True), ("8 Lips Toward Each Other", False)):
+        layout = Layout()
+        bone = type("Bone", (), {"path_resolve": str, "id_properties_ui": lambda *_: _Number()})()
+        layout.column().prop(bone, '["AU"]', text=name)
+        assert bool(layout.too_wide()) == cut
+    assert pixels("11 Nasolabial Furrow Deepe\u2026") + pixels("0.000") == SLIDER, "what the bound was measured with"
+
+
+class _Number:
+    def as_dict(self):
+        return {"max": 1.0, "precision": 3}
+
+
+def test_sliders_with_a_unit_say_it(addon):
+    settings = bpy.types.Object.bl_rna.properties["sanguine"].fixed_type.properties
+    names = {row.id: settings[row.id].name for row in PARAMETERS.values()}
+    assert names["epidermis_thickness_mm"] == "Epidermis Thickness (mm)" and names["melanin"] == "Melanin"
+    for row in PARAMETERS.values():
+        assert names[row.id].endswith(f" ({row.unit})") == (row.unit != "1")
 
 
 def test_tooltips_have_unit_range_and_source(addon):
