@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 import bpy
 
 from ..domain.effects import EFFECTS, ShaderInput, grown, residual, skin_map, strain, wrinkles
-from ..domain.lut import Table, bake
+from ..domain.lut import Table, bake, relief_kept
 from ..domain.parameters import PARAMETERS
 from ..domain.plan import Plan
 from ..domain.shader import TABLE_MIX, Shader, assemble, lobe_sockets, table_slices
@@ -141,7 +141,12 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map], shading
         build.link(build.script("relief", shaders["relief"]).outputs["height_mm"], bump.inputs["Height"])
         build.link(bump.outputs["Normal"], lobes.inputs["Normal"])
     end = build.node("NodeGroupOutput")
-    build.link(lobes.outputs["BSDF"], end.inputs["BSDF"])
+    shown = lobes.outputs["BSDF"]
+    if "leaving" in lobes.outputs:
+        lobes.inputs["relief_kept"].default_value = relief_kept(plan.skin)
+        if shading == NODES:
+            shown = build.unless_leaving(shown, lobes.outputs["leaving"])
+    build.link(shown, end.inputs["BSDF"])
     build.arrange(points, lobes, end)
     return tree
 
@@ -277,6 +282,19 @@ class _Builder:
                 self.link(node.outputs["Color"], lobes.inputs[socket])
         if TABLE_MIX in points.outputs:
             self.link(points.outputs[TABLE_MIX], lobes.inputs[TABLE_MIX])
+
+    def unless_leaving(self, whole: bpy.types.NodeSocket, leaving: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """`whole`, but `leaving` where Cycles asks for the normal at which light leaves the skin: on a path that is no
+        longer the camera's and has not bounced. A mix by 0 or 1 runs one side alone."""
+        path, far, mix = (self.node(f"ShaderNode{kind}") for kind in ("LightPath", "Math", "MixShader"))
+        far.operation = "ADD"
+        far.use_clamp = True
+        self.link(path.outputs["Is Camera Ray"], far.inputs[0])
+        self.link(path.outputs["Ray Depth"], far.inputs[1])
+        self.link(far.outputs[0], mix.inputs[0])
+        self.link(leaving, mix.inputs[1])
+        self.link(whole, mix.inputs[2])
+        return mix.outputs[0]
 
     def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
         """Columns from left to right, so that a person can read the group."""

@@ -124,3 +124,15 @@ def bake(
         quantities = np.concatenate([quantities, walk_of(skins, fit["weights"].sum(1), working_space)], axis=1)
     image = np.ascontiguousarray(table_image(quantities, axes), dtype=np.float32)
     return Table(axes, lobes, image, fit["clamped"].max(0), fit["fit_error"].max(0), walk)
+
+
+RELIEF_MM = 0.3
+"""Width of a furrow or a pore, about."""
+
+
+def relief_kept(skin: Skin) -> float:
+    """Share (0-1) of the relief that light from under the skin still shows: it has forgotten the shape of the place where
+    it entered once it has gone further than the relief is wide. A guess of ours by eye."""
+    fit = sanguine_core.burley_lobes(skin_rows([skin]), "rec709", lobe_count=1)
+    weights, d_mm = fit["weights"], fit["d_mm"]
+    return float((weights * RELIEF_MM / (RELIEF_MM + d_mm)).sum() / max(weights.sum(), 1e-6))
