@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..domain.blood import BLOOD, BLOOD_CONTROL, HEART_RATE_CONTROL, PACE_CONTROL, PRESSURE_CONTROL, blood_property
-from ..domain.effects import pressure
+from ..domain.effects.packed import PRESSURE
 from ..domain.errors import InputError
 from ..domain.vascular import VASCULAR, Controls, blood_over_time, pressure_over_time
 from .blood import PROFILE, blood_model, blood_properties, blood_sliders, mute_blood
@@ -60,7 +60,7 @@ def bake_blood(
     controls = Controls(frames * (scene.render.fps_base / scene.render.fps), values)
     changes = {blood_property(quantity, region): c for (region, quantity), c in blood_over_time(controls, blood_model(armature)).items()}
     if PRESSURE_CONTROL in values:
-        changes[pressure.PROPERTY] = pressure_over_time(controls, values[PRESSURE_CONTROL])
+        changes[PRESSURE] = pressure_over_time(controls, values[PRESSURE_CONTROL])
     write_blood(face, frames, changes)
     face[RECORD] = {"of": print_of_inputs, "first": first, "last": last}
     return first, last

@@ -1,9 +1,12 @@
-"""The blood of a face as custom properties of its skin, which the material reads: driven live from the controls."""
+"""The blood of a face as custom properties of its skin, driven live from the controls.
+
+People see, key and bake one property a number. The material reads others, three numbers each, that follow them.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 import bpy
@@ -18,7 +21,7 @@ from ..domain.blood import (
     Blood,
     BloodChannel,
 )
-from ..domain.effects import pressure
+from ..domain.effects.packed import NUMBERS, PREFIX, PRESSURE
 from ..domain.facs import EMOTION_CONTROLS
 from ..domain.files import validate
 from ..domain.profile import Profile, with_profile
@@ -33,12 +36,17 @@ _PART_TERMS = 14
 
 
 def blood_properties(face: bpy.types.Object) -> tuple[str, ...]:
-    """The properties by which the material of a face reads its blood."""
-    return tuple(name for name in _ours(face) if _PART not in name)
+    """The properties that people see and key, that drivers or a bake move, and that the material's own follow."""
+    return tuple(name for name in _driven(face) if _PART not in name)
+
+
+def _driven(face: bpy.types.Object) -> list[str]:
+    """Those that depend on the rig: the above, and their partial sums."""
+    return [name for name in _ours(face) if not name.startswith(PREFIX)]
 
 
 def _ours(face: bpy.types.Object) -> list[str]:
-    return [name for name in face.keys() if name.startswith("blood_") or name == pressure.PROPERTY]
+    return [name for name in face.keys() if name.startswith("blood_") or name == PRESSURE]
 
 
 def blood_sliders(armature: bpy.types.Object) -> tuple[str, ...]:
@@ -68,17 +76,17 @@ def blood_model(armature: bpy.types.Object) -> Blood:
 
 
 def drive_settled(armature: bpy.types.Object, skin: bpy.types.Object, names: Collection[str]) -> None:
-    """Puts the driven properties `names`, those that a material reads, on `skin`: blood as far as the rig moves it."""
+    """Puts the driven properties `names` on `skin`: blood as far as the rig moves it."""
     channels = blood_model(armature).channels(blood_sliders(armature)).values()
     drive_blood(armature, skin, [channel for channel in channels if channel.property_name in names])
-    if pressure.PROPERTY in names:
+    if PRESSURE in names:
         drive_pressure(armature, skin)
 
 
 def drive_blood(
     armature: bpy.types.Object, skin: bpy.types.Object, channels: Iterable[BloodChannel]
 ) -> tuple[str, ...]:
-    """Puts one driven custom property per channel on `skin`, for the material to read. Returns their names."""
+    """Puts one driven custom property per channel on `skin`. Returns their names."""
     names = []
     for channel in channels:
         name, response = channel.property_name, channel.response
@@ -109,16 +117,36 @@ def _drive_in_parts(armature: bpy.types.Object, skin: bpy.types.Object, name: st
     drive(skin, f'["{name}"]', total, armature, own=parts)
 
 
+def drive_packed(skin: bpy.types.Object, packed: Mapping[str, tuple[str, ...]]) -> None:
+    """Puts the properties that the material reads on `skin`, following those that people see (`Plan.packed`). What of
+    these no rig moves is there as 0, to be set or keyed."""
+    for name, parts in packed.items():
+        skin[name] = [0.0] * NUMBERS
+        read = ", ".join(filter(None, parts))
+        skin.id_properties_ui(name).update(description=f"What the material reads. It follows {read}: key these instead")
+        for i, part in enumerate(parts):
+            if not part:
+                continue
+            if part not in skin:
+                skin[part] = 0.0
+                skin.property_overridable_library_set(f'["{part}"]', True)
+            curve = skin.driver_add(f'["{name}"]', i)
+            curve.keyframe_points.clear()  # as in controls.drive
+            curve.driver.type = "SUM"  # of one: a copy, for which nothing is parsed
+            variable = curve.driver.variables.new()
+            variable.targets[0].id, variable.targets[0].data_path = skin, f'["{part}"]'
+
+
 def drive_pressure(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
     """The same for what presses on the skin, live without the time that the blood takes to come back."""
-    skin[pressure.PROPERTY] = 0.0
-    describe(skin, pressure.PROPERTY, "How hard it presses, driven by the slider", 0.0, 1.0, 0.0)
-    skin.property_overridable_library_set(f'["{pressure.PROPERTY}"]', True)
-    drive(skin, f'["{pressure.PROPERTY}"]', Response(((1.0, PRESSURE_CONTROL),)), armature)
+    skin[PRESSURE] = 0.0
+    describe(skin, PRESSURE, "How hard it presses, driven by the slider", 0.0, 1.0, 0.0)
+    skin.property_overridable_library_set(f'["{PRESSURE}"]', True)
+    drive(skin, f'["{PRESSURE}"]', Response(((1.0, PRESSURE_CONTROL),)), armature)
 
 
 def remove_blood(skin: bpy.types.Object) -> None:
-    """Removes the properties of `drive_settled` and their drivers."""
+    """Removes the properties of `drive_settled` and `drive_packed` and their drivers."""
     for name in _ours(skin):
         skin.driver_remove(f'["{name}"]')
         del skin[name]
@@ -126,17 +154,18 @@ def remove_blood(skin: bpy.types.Object) -> None:
 
 
 def mute_blood(skin: bpy.types.Object, mute: bool) -> None:
-    """Silences the drivers of the blood, or lets them speak again; unlike a removal, a library override keeps this."""
-    ours = {f'["{name}"]' for name in _ours(skin)}
+    """Silences the drivers of the blood, or lets them speak again; unlike a removal, a library override keeps this. What
+    the material reads goes on following."""
+    ours = {f'["{name}"]' for name in _driven(skin)}
     for curve in skin.animation_data.drivers if skin.animation_data else ():
         if curve.data_path in ours:
             curve.mute = mute
 
 
 def redrive_blood(armature: bpy.types.Object, skin: bpy.types.Object) -> None:
-    """Drives what the material reads as the rig's sliders and profile now want it; what they leave still is 0."""
+    """Drives the blood as the rig's sliders and profile now want it; what they leave still is 0."""
     kept = blood_properties(skin)
-    for name in _ours(skin):
+    for name in _driven(skin):
         skin.driver_remove(f'["{name}"]')
         if name in kept:
             skin[name] = 0.0

@@ -222,17 +222,8 @@ class _Builder:
         return self.begin.outputs[label]
 
     def _from_object(self, key: str) -> bpy.types.NodeSocket:
-        return self._attribute("OBJECT", key).outputs["Fac"]
-
-    def _from_object_color(self, key: str) -> bpy.types.NodeSocket:
-        node = self._attribute("OBJECT", key)
-        self.sources["object:color", key] = node.outputs["Color"]
-        self.sources["object:alpha", key] = node.outputs["Alpha"]
-        return node.outputs["Color"]
-
-    def _from_object_alpha(self, key: str) -> bpy.types.NodeSocket:
-        self._from_object_color(key)
-        return self.sources["object:alpha", key]
+        """Its color alone: Cycles looks every linked output up by itself."""
+        return self._attribute("OBJECT", key).outputs["Color"]
 
     def _from_vertex_weight(self, key: str) -> bpy.types.NodeSocket:
         return self._attribute("GEOMETRY", key).outputs["Fac"]

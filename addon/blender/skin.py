@@ -18,7 +18,7 @@ from ..domain.shading import AUTO, OSL, choose
 from ..domain.texel_density import MapSizes, map_sizes, mm_per_uv
 from ..domain.udim import FIRST_TILE, check_tiles
 from .bake import clear_bake
-from .blood import drive_settled, remove_blood
+from .blood import drive_packed, drive_settled, remove_blood
 from .colour import working_space
 from .material import MARK, Map, build_skin_material, number_free, remove_skin_material
 from .osl import renderer_of
@@ -94,7 +94,8 @@ def skin_tasks(
         clear_bake(face)
         remove_blood(face)
         if armature is not None:
-            drive_settled(armature, face, inputs)
+            drive_settled(armature, face, {name for parts in plan.packed.values() for name in parts})
+        drive_packed(face, plan.packed)
         remove_components(face)
         for images, coefficients, one_sided in components:
             drive_components(face, images, surface.keys.names, coefficients, one_sided)

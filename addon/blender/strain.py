@@ -1,6 +1,6 @@
 """Drivers from shape keys to the components of strain and wrinkles: custom properties that the material reads.
 
-Each property holds four numbers, the components of one image in one half of the face. The drivers are simple
+Each property holds three numbers, components of one image in one half of the face, or of the alphas of several. The drivers are simple
 expressions that listen to the keys' values, whatever moves these (keyframes, drivers, capture), so a file with them
 works without the add-on and with auto-run off.
 """
@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ..domain.effects import strain, wrinkles
+from ..domain.effects.packed import NUMBERS
 from ..domain.effects.strain import HALVES
 from ..domain.key_sums import KeySum, key_sums
 from ..domain.response import MAX_EXPRESSION
@@ -26,28 +27,29 @@ _PART = "_part"
 def drive_components(
     face: bpy.types.Object, images: Sequence[str], keys: Sequence[str], coefficients: np.ndarray, one_sided: bool
 ) -> None:
-    """Puts the driven properties `<image>_left` and `<image>_right` on `face`.
+    """Puts the driven properties `<image>_left`, …, of `packed_components` on `face`.
 
     coefficients: (2, C, K), four components per image. one_sided: what is below 0 counts as 0. A sum too long for one
     driver is taken in parts, each a property of its own.
     """
     for half, name in enumerate(HALVES):
-        for i, image in enumerate(images):
-            rows = coefficients[half, 4 * i : 4 * i + 4]
+        for stem, held in strain.packed_components(tuple(images)).items():
+            rows = [coefficients[half, i] for i in held]
             sums = [key_sums({k: c for k, c in zip(keys, row, strict=True) if abs(c) >= LEAST}) for row in rows]
-            _drive_property(face, f"{image}_{name}", sums, one_sided)
+            _drive_property(face, f"{stem}_{name}", sums, one_sided)
 
 
 def remove_components(face: bpy.types.Object) -> None:
-    """Removes the properties of `drive_components` and their drivers."""
-    ours = {f"{image}_{half}" for image in (*strain.IMAGES, *wrinkles.IMAGES) for half in HALVES}
+    """Removes the properties of `drive_components` and their drivers, also as versions before 3 had them."""
+    stems = [stem for images in (strain.IMAGES, wrinkles.IMAGES) for stem in strain.packed_components(images)]
+    ours = {f"{stem}_{half}" for stem in stems for half in HALVES}
     for name in [key for key in face.keys() if key.partition(_PART)[0] in ours]:
         face.driver_remove(f'["{name}"]', -1)
         del face[name]
 
 
 def _drive_property(face: bpy.types.Object, name: str, sums: list[list[KeySum]], one_sided: bool) -> None:
-    face[name] = [0.0] * len(sums)
+    face[name] = [0.0] * NUMBERS
     _describe(face, name)
     for i, several in enumerate(sums):
         if not several:
@@ -61,7 +63,7 @@ def _drive_property(face: bpy.types.Object, name: str, sums: list[list[KeySum]],
         for part, one in enumerate(several):
             part_name = f"{name}{_PART}{part}"
             if part_name not in face:
-                face[part_name] = [0.0] * len(sums)
+                face[part_name] = [0.0] * NUMBERS
                 _describe(face, part_name)
             _drive(face, part_name, i, one.expression, {v: _value_of(face, key) for v, key in one.keys.items()})
             chain[f"s{part}"] = ("OBJECT", face, f'["{part_name}"][{i}]')

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 
 from .effects import EFFECTS, ELSEWHERE, Activation, Bounds, Effect, Fragment, Scene, grown, scattering, skin_map, thin
+from .effects.packed import packed
 from .errors import InputError, nearest
 from .parameters import PARAMETERS, Skin
 from .quality import DEFAULT, Settings, preset
@@ -87,6 +88,12 @@ class Plan:
         if any(item.source == "chromophores" and item.key == "film" for item in inputs):
             named.add("oil")
         return frozenset(named - set(skin_map.held(self.scene)))
+
+    @property
+    def packed(self) -> dict[str, tuple[str, ...]]:
+        """What the material reads of the object's blood: property of three numbers -> the properties that people key and
+        bake, which these follow, "" where none."""
+        return packed(self.fragments)
 
     @property
     def fingerprint(self) -> str:

@@ -15,6 +15,7 @@ from sanguine.domain.errors import InputError
 from sanguine.domain.vascular import Controls, blood_over_time
 
 CHEEKS = "blood_hemoglobin_cheeks"
+PACKED = {"blood_packed_a": (CHEEKS, "", "blood_oxygenation_lips"), "blood_packed_b": ("pressure", "blood_oxygenation_elsewhere", "")}
 KEYS = {"anger": ([1, 9, 40, 49], [0.0, 1.0, 1.0, 0.0]), "fear": ([40, 60, 80], [0.0, 0.8, 0.0])}
 
 
@@ -38,6 +39,7 @@ def face():
     sliders = blood.blood_sliders(armature)
     blood.drive_blood(armature, skin, BLOOD.channels(sliders).values())
     blood.drive_pressure(armature, skin)
+    blood.drive_packed(skin, PACKED)
     ensure_action(armature, "shot")
     for name, (frames, values) in KEYS.items():
         set_keys(action_curve(armature, path_of(name)), frames, values)
@@ -67,7 +69,28 @@ def test_the_curves_are_the_model(face):
             # Blender stores keys in single precision: 6e-8 of values up to 0.1.
             assert value == pytest.approx(model[name][frame - 1] if name in model else 0.0, abs=2e-8), (name, frame)
     assert played(skin, 10)[CHEEKS] < 0.3 * settled({"anger": 1.0})["cheeks", "hemoglobin"]
-    assert all(curve.mute for curve in skin.animation_data.drivers)
+    assert all(curve.mute != curve.data_path.startswith('["blood_packed') for curve in skin.animation_data.drivers)
+
+
+def test_what_the_material_reads_follows_drivers_and_curves(face):
+    """In the same evaluation, whatever moves what people see; it is none of what they key."""
+    armature, skin = face
+    assert not set(PACKED) & set(blood.blood_properties(skin))
+    set_keys(action_curve(armature, path_of("pressure")), [1, 20, 21, 30, 31], [0, 0, 1, 1, 0])
+    for baked in (False, True):
+        if baked:
+            bake.bake_blood(skin, armature, bpy.context.scene)
+        for frame in (1, 25, 60, 25):
+            values = played(skin, frame)
+            held = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            for name, parts in PACKED.items():
+                np.testing.assert_array_equal(held[name], np.float32([values.get(part, 0.0) for part in parts]))
+        assert played(skin, 60)[CHEEKS] and played(skin, 25)["pressure"] == pytest.approx(1.0, abs=1e-6)
+    bake.clear_bake(skin)
+    blood.redrive_blood(armature, skin)
+    assert played(skin, 25)[CHEEKS] == pytest.approx(settled({"anger": 1.0})["cheeks", "hemoglobin"])
+    held = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert held["blood_packed_a"][0] == pytest.approx(played(skin, 25)[CHEEKS]) and held["blood_packed_b"][0] == 1.0
 
 
 def test_what_does_not_move_gets_no_curve(face):
@@ -202,7 +225,9 @@ def test_a_baked_file_plays_any_frame_without_the_add_on(face, tmp_path):
         bpy.ops.wm.open_mainfile(filepath={path!r}, use_scripts=False)
         bpy.context.scene.frame_set(60)
         skin = bpy.data.objects["skin"]
-        print("VALUE", repr(skin.evaluated_get(bpy.context.evaluated_depsgraph_get())["{CHEEKS}"]))
+        skin = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert abs(skin["blood_packed_a"][0] - skin["{CHEEKS}"]) < 1e-8
+        print("VALUE", repr(skin["{CHEEKS}"]))
     """
     run = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
@@ -229,6 +254,7 @@ OVERRIDDEN = """
     bpy.ops.wm.open_mainfile(filepath={shot!r})
     bpy.context.scene.frame_set(60)
     skin = next(o for o in bpy.data.objects if o.type == "MESH" and o.override_library)
+    assert abs(skin.evaluated_get(bpy.context.evaluated_depsgraph_get())["blood_packed_a"][0] - skin["{name}"]) < 1e-8
     print("VALUE", repr(skin["{name}"]))
 """
 

@@ -10,6 +10,7 @@ import pytest
 import sanguine
 from sanguine.app.skin_report import report
 from sanguine.blender import operators
+from sanguine.blender.blood import drive_packed
 from sanguine.blender.images import data_image, store_range, stored_range
 from sanguine.blender.material import MARK, build_skin_material, remove_skin_material
 from sanguine.domain.effects import Frame, Scene
@@ -129,6 +130,7 @@ def test_what_a_state_brings_out_follows_the_object():
     plan = make_plan(Scene(default_skin() | {"oil": 0.0}, (Frame("0", {"rash": 1.0}),), {"anatomy": 0.0}))
     maps = {"keyed_rash": halves([0.0, 0.0, 0.0, 0.0], [1.2, 0.0, 0.0, 0.1]), "keyed_rash_height": halves([0.0], [0.0])}
     thing = patch(lambda: build_skin_material("skin", plan, maps))
+    drive_packed(thing, plan.packed)
     skin = default_skin()
     for strength in (0.0, 0.5, 1.0, 2.0):
         thing["blood_feature_rash"] = strength

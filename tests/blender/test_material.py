@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import sanguine_core
 from sanguine.blender.properties import SkinSettings
+from sanguine.blender.material import properties_read
 from sanguine.blender.skin import apply_skin
 from sanguine.blender.surface import REST_ATTRIBUTE, store_regions
 from sanguine.domain.effects import Frame, Scene
@@ -56,9 +57,37 @@ def test_emotion_brings_its_maps_properties_and_axes(face):
     material = apply_skin(face, None, plan)
     assert sanguine_core.counters()["lobe_fits"] == 3 * plan.entries
     assert sanguine_core.counters()["texels_rasterized"] > 0
-    read = {node.attribute_name for node in nodes(material) if node.bl_idname == "ShaderNodeAttribute"}
-    assert "blood_hemoglobin_cheeks" in read
+    assert properties_read(material) == set(plan.packed)
+    assert {"blood_packed_hemoglobin_0", "blood_packed_oxygenation_0"} <= set(plan.packed)
     assert {"hemoglobin", "oxygenation"} <= {axis.id for axis in plan.axes}
+
+
+def test_a_face_without_a_rig_is_keyed_by_hand(face):
+    """What the material reads follows what people key, for a regions mask by mask, and nothing else moves."""
+    plan = make_plan(scene(frames=(Frame("neutral"), Frame("fear", {"fear": 1.0}))))
+    apply_skin(face, None, plan)
+    for frame, value in ((1, 0.0), (11, 0.01)):
+        face["blood_hemoglobin_cheeks"] = value
+        face.keyframe_insert('["blood_hemoglobin_cheeks"]', frame=frame)
+    bpy.context.scene.frame_set(11)
+    held = face.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    moved = {(name, i): value for name in plan.packed for i, value in enumerate(held[name]) if value}
+    at = next((name, parts.index("blood_hemoglobin_cheeks")) for name, parts in plan.packed.items() if "blood_hemoglobin_cheeks" in parts)
+    assert moved == {at: pytest.approx(0.01)}
+    paths = {(curve.data_path[2:-2], curve.array_index) for curve in face.animation_data.drivers}
+    assert paths == {(name, i) for name, parts in plan.packed.items() for i, part in enumerate(parts) if part}
+    assert {name for parts in plan.packed.values() for name in parts if name} == {k for k in face.keys() if k.startswith("blood_")} - set(plan.packed)
+
+
+def test_every_property_is_looked_up_once(face):
+    """Cycles looks up each linked output of an Attribute node by itself."""
+    strengths = {"strain": 1.0, "wrinkles": 1.0}
+    face.shape_key_add(name="Basis")
+    face.shape_key_add(name="jawOpen").data[0].co.z += 0.01
+    apply_skin(face, None, make_plan(scene(frames=(Frame("anger", {"anger": 1.0}),), strengths=strengths)))
+    read = [n for n in nodes(face.material_slots[0].material) if n.bl_idname == "ShaderNodeAttribute" and n.attribute_type == "OBJECT"]
+    assert len({node.attribute_name for node in read}) == len(read) >= 12
+    assert [[socket.name for socket in node.outputs if socket.is_linked] for node in read] == [["Color"]] * len(read)
 
 
 def test_everything_is_inside_the_file(face):

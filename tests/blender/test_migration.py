@@ -14,6 +14,7 @@ from support.patch import render_linear
 from tests.blender.test_addon import draw, grid
 
 OLD = Path(__file__).resolve().parents[1] / "data" / "version_1.blend"
+SINGLE = OLD.with_name("version_2.blend")
 
 
 pytestmark = pytest.mark.usefixtures("addon")
@@ -58,6 +59,35 @@ def test_an_old_skin_comes_off_with_its_rig(old):
         assert set(face.keys()) <= {"sanguine"}  # Blender's own place of the settings
         assert not bpy.data.armatures and not bpy.data.materials and not bpy.data.images and not bpy.data.texts
         assert face.data.shape_keys.animation_data is None and face.sanguine.melanin == pytest.approx(0.1)
+
+
+def test_a_skin_that_reads_every_number_by_itself_does_so_until_it_is_applied_again():
+    """Whatever is done to the face meanwhile: bring it up to date, bake, drive its blood anew."""
+    bpy.ops.wm.open_mainfile(filepath=str(SINGLE))
+    scene, face = bpy.context.scene, bpy.data.objects["face"]
+    bpy.context.view_layer.objects.active = face
+    rest, angry = shown(1), shown(10)
+    assert face["blood_hemoglobin_cheeks"] > 0.001 and np.abs(np.array(face["strain_0_left"])).max() > 0.01
+    assert len(face["strain_0_left"]) == 4 and np.abs(angry - rest).max() > 0.005, "anger shows"
+    assert "three numbers" in " ".join(migration.bring_up_to_date(face))
+    assert bpy.ops.sanguine.add_feeling(feeling="shame") == bpy.ops.sanguine.remove_feeling(feeling="shame") == {"FINISHED"}
+    scene.frame_end = 10
+    assert bpy.ops.sanguine.bake_blood() == bpy.ops.sanguine.clear_blood() == {"FINISHED"}
+    np.testing.assert_allclose(shown(10), angry, atol=1e-6)  # rounding alone
+    names = set(face.keys())
+    assert not [name for name in names if "packed" in name]
+    assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
+    assert len(face["strain_0_left"]) == 3 and names < set(face.keys())
+    # Another order of sums; the maps are drawn anew.
+    np.testing.assert_allclose(shown(10).mean((0, 1)), angry.mean((0, 1)), rtol=0.01)
+    np.testing.assert_allclose(shown(1).mean((0, 1)), rest.mean((0, 1)), rtol=0.01)
+    assert bpy.ops.sanguine.remove_skin() == {"FINISHED"}
+    assert not [name for name in face.keys() if name.startswith(("blood_", "strain_"))] and face.animation_data is None
+
+
+def shown(frame):
+    bpy.context.scene.frame_set(frame)
+    return render_linear()
 
 
 def test_names_and_units_of_settings_that_are_no_more(old, monkeypatch):

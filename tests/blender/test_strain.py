@@ -25,7 +25,8 @@ from sanguine.domain.plan import check_strengths, make_plan
 from support.patch import camera_above, empty_scene, plane, render_linear, white_world
 
 STRENGTHS = {"strain": 1.0, "wrinkles": 1.0, "anatomy": 0.0}
-PROPERTIES = [f"{image}_{half}" for image in (*strain.IMAGES, *wrinkles.IMAGES) for half in strain.HALVES]
+PACKED = {k: v for images in (strain.IMAGES, wrinkles.IMAGES) for k, v in strain.packed_components(images).items()}
+PROPERTIES = [f"{name}_{half}" for name in PACKED for half in strain.HALVES]
 
 
 def plan_of(frames=(Frame("happy", {"happy": 1.0}),), **strengths):
@@ -44,10 +45,18 @@ def face():
 def driven(skin):
     """(2, C) of strain and of wrinkles after evaluation."""
     held = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return [
-        np.array([np.concatenate([held[f"{image}_{half}"] for image in images]) for half in strain.HALVES])
-        for images in (strain.IMAGES, wrinkles.IMAGES)
-    ]
+    return components({name: np.array(held[name]) for name in PROPERTIES if name in held})
+
+
+def components(held):
+    """The numbers of properties, each where its component is."""
+    found = np.full((2, 2, domain_strain.COMPONENTS), np.nan)
+    for kind, images in enumerate((strain.IMAGES, wrinkles.IMAGES)):
+        for name, rows in strain.packed_components(images).items():
+            for half, side in enumerate(strain.HALVES):
+                found[kind, half, list(rows)] = held[f"{name}_{side}"][: len(rows)]
+                assert not held[f"{name}_{side}"][len(rows) :].any() and len(held[f"{name}_{side}"]) == 3
+    return found
 
 
 def expected(skin):
@@ -132,13 +141,11 @@ def test_keyed_values_are_followed_without_lag_and_without_the_add_on(face, tmp_
     rows = [np.array(line.split()[1:], float) for line in run.stdout.splitlines() if line.startswith("VALUES")]
     surface = read_surface(face.skin)
     values = np.array([float(name in ("mouthSmileLeft", "jawOpen")) for name in surface.keys.names])
-    wanted = []
     area = kept(strain_coefficients(surface)) @ values
     folds = np.maximum(kept(wrinkle_coefficients(surface)) @ values, 0.0)
-    for images, drive in ((strain.IMAGES, area), (wrinkles.IMAGES, folds)):
-        wanted += [drive[half, 4 * i : 4 * i + 4] for i in range(len(images)) for half in range(2)]
-    assert np.abs(np.concatenate(wanted)).max() > 0.3
-    assert rows[1] == pytest.approx(np.concatenate(wanted), abs=2 * 0.00005)  # two keys, written to four decimals
+    wanted, found = np.stack([area, folds]), components(dict(zip(PROPERTIES, rows[1].reshape(-1, 3), strict=True)))
+    assert np.abs(wanted).max() > 0.3
+    assert found == pytest.approx(wanted, abs=2 * 0.00005)  # two keys, written to four decimals
     assert not rows[0].any() and not rows[2].any()
 
 

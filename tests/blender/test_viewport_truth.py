@@ -7,7 +7,7 @@ properties, shape keys and places of the evaluated objects, which are compared h
 import bpy
 import numpy as np
 import pytest
-from sanguine.blender.operators import emotion_bone
+from sanguine.blender.operators import emotion_bone, live_plan
 from support.patch import empty_scene
 from tests.blender.test_adopt import make_face, registered, select, solved_once  # noqa: F401
 
@@ -26,6 +26,7 @@ class Probe(bpy.types.RenderEngine):
     bl_label = "Probe"
     seen: list = []
     wanted: tuple = ()
+    cheeks: tuple = ()  # which of these, and which of its numbers
 
     def update(self, _data, depsgraph):
         assert depsgraph.mode == "RENDER"
@@ -43,15 +44,14 @@ def given(depsgraph):
     keys = [block.value for block in face.original.data.shape_keys.evaluated_get(depsgraph).key_blocks]
     positions = np.empty(3 * len(face.data.vertices), np.float32)
     face.data.vertices.foreach_get("co", positions)
-    return np.concatenate([values[CHEEKS], keys, *values, positions, np.array(face.matrix_world).ravel()])
+    return np.concatenate([values[Probe.cheeks[0]][[Probe.cheeks[1]]], keys, *values, positions, np.array(face.matrix_world).ravel()])
 
 
 def read_names(face):
     """Object properties by the names that the skin's material asks for."""
     groups = [node.node_tree for node in face.material_slots[0].material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup"]
     nodes = [node for group in groups for node in group.nodes if node.bl_idname == "ShaderNodeAttribute"]
-    names = {node.attribute_name for node in nodes if node.attribute_type == "OBJECT"}
-    return tuple(sorted(names, key=lambda name: (name != "blood_hemoglobin_cheeks", name)))
+    return tuple(sorted(node.attribute_name for node in nodes if node.attribute_type == "OBJECT"))
 
 
 @pytest.fixture
@@ -75,7 +75,9 @@ def scene():
     scene.collection.objects.link(scene.camera)
     scene.frame_start, scene.frame_end = 1, 12
     Probe.wanted, Probe.seen = read_names(face), []
-    assert "blood_hemoglobin_cheeks" in Probe.wanted and any(name.startswith("strain") for name in Probe.wanted), Probe.wanted
+    packed = next((name, parts) for name, parts in live_plan(face).packed.items() if "blood_hemoglobin_cheeks" in parts)
+    Probe.cheeks = Probe.wanted.index(packed[0]), packed[1].index("blood_hemoglobin_cheeks")
+    assert any(name.startswith("strain") for name in Probe.wanted), Probe.wanted
     bpy.utils.register_class(Probe)
     yield scene
     bpy.utils.unregister_class(Probe)

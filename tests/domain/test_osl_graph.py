@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 from sanguine.domain import film, strain
-from sanguine.domain.effects import EFFECTS, Frame, Scene
-from sanguine.domain.effects.regions import FACE_REGIONS
+from sanguine.domain.effects import EFFECTS, ELSEWHERE, Frame, Scene
+from sanguine.domain.effects import strain as effect
+from sanguine.domain.effects.regions import FACE_REGIONS, region_images
 from sanguine.domain.op_graph import Closure, Untranslatable, evaluate
 from sanguine.domain.osl_graph import compile_stage
 from sanguine.domain.parameters import default_skin
@@ -54,7 +55,7 @@ def test_what_a_plan_leaves_out_is_no_operation():
     few, many = (len(stage(plan_of(strengths), "chromophores").ops()) for strengths in ({}, ALL_ON))
     assert few < 0.5 * many
     kinds = {op.kind for op in stage(plan_of({}, live=False, oil=0.0), "chromophores").ops()}
-    assert kinds <= {"const", "input", "pack", "add", "mul", "max", "sub", "x", "y", "z", "clamp", "log", "div"}, "no noise, no map"
+    assert kinds <= {"const", "input", "pack", "add", "mul", "max", "sub", "x", "y", "z", "clamp", "log", "div", "dot"}, "no noise, no map"
 
 
 def test_blood_of_strain_is_the_formula_of_the_domain():
@@ -64,13 +65,45 @@ def test_blood_of_strain_is_the_formula_of_the_domain():
     components = rng.uniform(-0.4, 0.4, (strain.COMPONENTS, 50))
     driven = rng.uniform(0.0, 1.0, (strain.COMPONENTS, 50))
     inputs = {"rest_mm": np.array([100.0, 0.0, 0.0]), "skin_hemoglobin": 0.02, "strain": 1.0}
-    for i in range(strain.COMPONENTS // 4):
-        for name, values in ((f"strain_{i}", components), (f"strain_{i}_left", driven)):
-            inputs[name] = values[4 * i : 4 * i + 3].T
-            inputs[f"{name}_alpha"] = values[4 * i + 3]
+    for i, image in enumerate(effect.IMAGES):
+        inputs[image], inputs[f"{image}_alpha"] = components[4 * i : 4 * i + 3].T, components[4 * i + 3]
+    for name, rows in effect.packed_components(effect.IMAGES).items():
+        inputs[f"{name}_left"] = np.stack([*driven[list(rows)], *np.full((3 - len(rows), 50), 7.0)], axis=-1)
     found = evaluate(graph, inputs)["chromophores"][..., 0]
     expected = 0.02 * np.exp(strain.blood_change((components * driven).sum(0)))
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_blood_is_the_sum_over_regions_of_mask_and_number():
+    """Of all regions and of what is in none, as the object's properties hold them three by three."""
+    changes = {(region, "hemoglobin"): (-0.01, 0.01) for region in (*FACE_REGIONS[:2], *FACE_REGIONS[4:], ELSEWHERE)}
+    plan = make_plan(Scene(default_skin(), (Frame("a", changes=changes),), default_strengths() | {"anatomy": 0.0}, FACE_REGIONS))
+    rng = np.random.default_rng(3)
+    masks = rng.dirichlet(np.ones(len(FACE_REGIONS) + 1), 40)[:, :-1]
+    value = {f"blood_hemoglobin_{region}": rng.uniform(-0.01, 0.01) for region, _ in changes}
+    assert {part for parts in plan.packed.values() for part in parts if part} == set(value)
+    inputs = {"skin_hemoglobin": 0.02}
+    for name, parts in plan.packed.items():
+        inputs[name] = np.array([value.get(part, 0.0) for part in parts])
+    for image, held in region_images(FACE_REGIONS).items():
+        shown = masks[:, [FACE_REGIONS.index(region) for region in held]]
+        inputs[image] = np.pad(shown, ((0, 0), (0, 3 - len(held))))
+    found = evaluate(stage(plan, "chromophores"), inputs)["chromophores"][..., 0]
+    expected = 0.02 + (1.0 - masks.sum(1)) * value["blood_hemoglobin_elsewhere"]
+    for i, region in enumerate(FACE_REGIONS):
+        expected = expected + masks[:, i] * value.get(f"blood_hemoglobin_{region}", 0.0)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_what_is_in_no_region_shares_one_property():
+    """Elsewhere of both quantities and the pressure; nothing of the regions, none of which moves."""
+    changes = {(ELSEWHERE, "hemoglobin"): (0.0, 0.01), (ELSEWHERE, "oxygenation"): (-0.1, 0.0)}
+    plan = make_plan(Scene(
+        default_skin(), (Frame("a", changes=changes),), default_strengths() | {"pressure": 1.0}, FACE_REGIONS, pressure=True, presses=True,
+    ))
+    assert plan.packed == {"blood_packed_others_0": ("blood_hemoglobin_elsewhere", "blood_oxygenation_elsewhere", "pressure")}
+    source = assemble(plan)["chromophores"].source
+    assert source.count("color blood_packed_others_0 = ") == 1 and "#define PRESSING blood_packed_others_0[2]\n" in source
 
 
 def test_place_in_the_table_is_where_the_axis_has_that_value():

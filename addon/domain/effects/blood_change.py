@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..blood import Change, blood_property, settled
+from ..blood import Change, settled
 from ..vascular import reach
-from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scene, ShaderInput, shift_bounds
+from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Scene, shift_bounds
 from .regions import mask_inputs, masked_sum
 
 
@@ -45,13 +45,13 @@ def blood_effect(effect_id: str, label: str, help: str, quantity: str) -> Effect
         return Activation(True, f"{', '.join(names)} move{'s' if len(names) == 1 else ''} {quantity}", frames)
 
     def fragments(scene: Scene) -> tuple[Fragment, ...]:
-        terms = {region: blood_property(quantity, region) for region in changes(scene)}
-        inputs = tuple(ShaderInput(name, "float", "object", name) for name in terms.values())
+        moved = changes(scene)
+        total, numbers = masked_sum(scene, quantity, moved)
         fragment = Fragment(
             stage="chromophores",
             file=f"{effect_id}.osl",
-            inputs=mask_inputs(scene, tuple(terms)) + inputs,
-            defines={f"{quantity.upper()}_CHANGE": masked_sum(scene, terms)},
+            inputs=mask_inputs(scene, moved) + numbers,
+            defines={f"{quantity.upper()}_CHANGE": total},
         )
         return (fragment,)
 
@@ -67,5 +67,5 @@ def blood_effect(effect_id: str, label: str, help: str, quantity: str) -> Effect
         activate=activate,
         fragments=fragments,
         bounds=bounds,
-        maps=lambda scene: tuple(i.key for i in mask_inputs(scene, tuple(changes(scene)))),
+        maps=lambda scene: tuple(i.key for i in mask_inputs(scene, changes(scene))),
     )

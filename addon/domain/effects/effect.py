@@ -86,8 +86,7 @@ class ShaderInput:
     """One input of the assembled shader and where its value comes from.
 
     source: "parameter" (a schema id, a slider of the node group), "strength" (the effect's own slider),
-    "object" (a custom property of the object, "object:color" and "object:alpha" the first three and the fourth of its
-    numbers), "vertex" (an attribute of the mesh, "vertex:weight" a single number of it), "map" (a packed image,
+    "object" (a custom property of the object, of three numbers), "vertex" (an attribute of the mesh, "vertex:weight" a single number of it), "map" (a packed image,
     "map:alpha" its alpha channel), "chromophores" (an output of the first shader, for inputs of the second).
     """
 
@@ -96,6 +95,8 @@ class ShaderInput:
     source: str
     key: str
     default: float = 0.0
+    # Of "object": the properties that its three numbers follow by drivers, "" where none (effects/packed.py).
+    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from .effect import (
     shift_bounds,
     strength_activation,
 )
+from .packed import other
 
 MAPS = {
     "grown": ("log_hemoglobin", "log_melanin", "log_oil", "oxygenation"),
@@ -135,7 +136,8 @@ def _keyed_fragments(scene: Scene) -> tuple[Fragment, ...]:
     terms: dict[str, list[str]] = {}
     inputs: dict[str, list[ShaderInput]] = {"grown": [], "grown_height": []}
     for feature in keyed(scene):
-        name, slider = f"{_KEYED}{feature}", blood_property(FEATURE, feature)
+        name = f"{_KEYED}{feature}"
+        item, slider = other(blood_property(FEATURE, feature))
         read = {
             **{channel: f"{name}[{MAPS['grown'].index(channel)}]" for channel in _FACTORS},
             "oxygenation": f"{name}_oxygenation",
@@ -152,7 +154,7 @@ def _keyed_fragments(scene: Scene) -> tuple[Fragment, ...]:
             inputs["grown_height"].append(ShaderInput(f"{name}{_HEIGHT}", "color", "map", f"{name}{_HEIGHT}"))
         for kind in inputs:
             if set(mine) & set(MAPS[kind]):
-                inputs[kind].append(ShaderInput(slider, "float", "object", slider))
+                inputs[kind].append(item)
     sums = {f"KEYED_{channel.upper()}": f"({' + '.join(added)})" for channel, added in terms.items()}
     height = sums.pop("KEYED_HEIGHT_MM", "")
     made = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from .effect import Activation, Bounds, Effect, Fragment, Scene, ShaderInput, scale_bounds, strength_activation
+from .packed import PRESSURE, other
 
 ATTRIBUTE = "sanguine_pressure"
 """Vertex group or float attribute of the mesh, 0 to 1: painted, or written by a modifier."""
@@ -14,10 +15,6 @@ ATTRIBUTE = "sanguine_pressure"
 LOG_HEMOGLOBIN = math.log(0.3)
 
 
-PROPERTY = "pressure"
-"""Custom property of the face: how hard it presses now, 0 to 1, of a face whose rig has a slider for it."""
-
-
 def _activate(scene: Scene) -> Activation:
     if not scene.pressure:
         return Activation(False, f"the face has no vertex group or attribute {ATTRIBUTE}")
@@ -25,15 +22,16 @@ def _activate(scene: Scene) -> Activation:
 
 
 def _fragments(scene: Scene) -> tuple[Fragment, ...]:
+    numbers, pressing = other(PRESSURE)
     fragment = Fragment(
         stage="chromophores",
         file="pressure.osl",
         inputs=(
             ShaderInput(ATTRIBUTE, "float", "vertex:weight", ATTRIBUTE),
             ShaderInput("pressure", "float", "strength", "pressure"),
-            *([ShaderInput("pressing", "float", "object", PROPERTY)] if scene.presses else []),
+            *([numbers] if scene.presses else []),
         ),
-        defines={"PRESSURE_LOG_HEMOGLOBIN": f"({LOG_HEMOGLOBIN:.6f})", "PRESSING": "pressing" if scene.presses else "1.0"},
+        defines={"PRESSURE_LOG_HEMOGLOBIN": f"({LOG_HEMOGLOBIN:.6f})", "PRESSING": pressing if scene.presses else "1.0"},
     )
     return (fragment,)
 

@@ -6,6 +6,7 @@ import math
 
 from .. import strain
 from .effect import Activation, Bounds, Effect, Fragment, Scene, ShaderInput, scale_bounds, strength_activation
+from .packed import NUMBERS
 
 IMAGES = tuple(f"strain_{i}" for i in range(strain.COMPONENTS // 4))
 """Images: components of the logarithm of the change of area, four in each (red, green, blue, alpha)."""
@@ -26,28 +27,32 @@ def moving_activation(scene: Scene, effect_id: str) -> Activation:
     return Activation(True, decision.because, frames)
 
 
+def packed_components(images: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    """Properties, but for the half of the face in their names -> the components, four to an image, that their numbers are:
+    the first three of each image, and by threes what the images hold in alpha. An image's own come under its name."""
+    alphas = [4 * i + NUMBERS for i in range(len(images))]
+    kind = images[0].rpartition("_")[0]
+    colors = {image: tuple(range(4 * i, 4 * i + NUMBERS)) for i, image in enumerate(images)}
+    return colors | {f"{kind}_alpha_{i // NUMBERS}": tuple(alphas[i : i + NUMBERS]) for i in range(0, len(alphas), NUMBERS)}
+
+
 def component_inputs(images: tuple[str, ...]) -> tuple[ShaderInput, ...]:
     """Images of components, the properties that drive them in each half of the face, and the place that says which."""
     inputs = [ShaderInput("rest_mm", "vector", "vertex", "rest_mm")]
     for image in images:
         inputs.append(ShaderInput(image, "color", "map", image))
         inputs.append(ShaderInput(f"{image}_alpha", "float", "map:alpha", image))
-        for half in HALVES:
-            name = f"{image}_{half}"
-            inputs += [
-                ShaderInput(name, "color", "object:color", name),
-                ShaderInput(f"{name}_alpha", "float", "object:alpha", name),
-            ]
-    return tuple(inputs)
+    names = [f"{name}_{half}" for name in packed_components(images) for half in HALVES]
+    return (*inputs, *(ShaderInput(name, "color", "object", name) for name in names))
 
 
 def component_sum(images: tuple[str, ...]) -> str:
     """OSL for the sum of the driven components; `left` is the share of the left half."""
     terms = []
-    for image in images:
-        driven = f"mix({image}_right, {image}_left, left)"
-        terms.append(f"dot(vector({image}), vector({driven}))")
-        terms.append(f"{image}_alpha * mix({image}_right_alpha, {image}_left_alpha, left)")
+    for name, held in packed_components(images).items():
+        alphas = [f"{images[i // 4]}_alpha" for i in held] + ["0.0"] * (NUMBERS - len(held))
+        components = name if name in images else ", ".join(alphas)
+        terms.append(f"dot(vector({components}), vector(mix({name}_right, {name}_left, left)))")
     return "(" + " + ".join(terms) + ")"
 
 
