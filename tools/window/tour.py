@@ -275,6 +275,8 @@ class Head(Window):
         s = self.s
         s.move(*s.region("WINDOW").middle)
         s.key("Delete")  # the cube, in which the head would be
+        view = "bpy.context.space_data.region_3d"
+        s.do(f"{view}.view_distance = 18.0")  # as Blender opens
         s.shot("start_panel")
         s.click(*s.find("Add", Box(0, 28, 500, 30)).middle)
         s.click(*s.find("Mesh", Box(200, 50, 300, 100)).middle)
@@ -282,7 +284,7 @@ class Head(Window):
         s.shot("add_head_menu")
         s.click(*s.find("Woman, about 30").middle)
         s.wait('"female_skin" in bpy.data.objects')
-        s.do("bpy.ops.view3d.view_selected()")
+        s.wait(f"{view}.view_distance < 3.0")  # it would be a speck
         s.shot("add_head")
 
     def adopt(self) -> None:
