@@ -54,7 +54,7 @@ PREPARED = {"anatomy": 1.0, "mottle": 0.6, "relief": 1.0}
 MEGAPIXELS = 512 * 640 / 1e6
 # Darker pixels are not compared: below L* = 2 nothing is seen, and the truth has little but noise there.
 DARKEST_Y = 0.0022
-# Scenes that a quality is judged by. The backlit sheet is not: no setting mends it.
+# Scenes that a quality is judged by. The backlit sheet is not: no setting mends it, the effect `thin` does (docs/thin_parts.md).
 JUDGED = ("patch", "edge", "sphere", "mapped", "live table")
 
 # THE RULE. A preset is the cheapest measured setting whose error is at most this many times the least error reached

@@ -240,7 +240,7 @@ At {samples} samples, lobes not denoised, the others denoised; the last column i
 {_table(["", *(f"{scene}, {skin}" for scene in SCENES for skin in SCENES[scene].skins), "s / 10^6"], error_rows)}
 The walk is Cycles' `random_walk` at its best: its colour corrected until the patch agrees, its radius such that the light in the shadow of the edge is as far from it as in the truth (light skin: colour {walk['light']['color']}, radius {walk['light']['radius_mm']} mm). Principled has the skin's colour and the usual radii.
 
-More lobes show more noise at equal samples, because each sample takes one of them, and they differ in colour; light skin at 0.1 mm is fitted by one lobe alone. Burley lobes were not made for light from behind: the sheet's colour is far off with every material here.
+More lobes show more noise at equal samples, because each sample takes one of them, and they differ in colour; light skin at 0.1 mm is fitted by one lobe alone. Burley lobes were not made for light from behind: the sheet's colour is far off with every material here. The effect *Thin parts* puts a walk in their place ([thin parts](thin_parts.md) has its error on this sheet).
 
 ## One setting at a time
 ![one setting at a time](accuracy_picture_factors.png)
@@ -255,7 +255,7 @@ Size of the maps (a texel of 1024 is 0.8 mm on the example head):
 
 {_table(["texels", "Delta E"], factor(results["maps"], "map_size"))}
 ## Presets
-The error of a setting is the 95th percentile of Delta E 2000, denoised, mean of {", ".join(JUDGED)} and of their skins. Not the sheet: no setting mends it. **The rule**: a preset is the cheapest measured setting whose error is at most {", ".join(f"{x:g} ({n})" for n, x in PRESET_RULE.items())} times the least that the settings open to it reached; {" and ".join(WHOLE)} keep the whole material ({" and ".join(map(str, WHOLE.values()))} lobes or more, table step {USUAL.table_step:g} or finer, maps of {USUAL.map_size} or more), because tests hold at those settings alone what these scenes do not show: the fall-off of very dark skin, the table while sliders move. A shot without `quality` is `final`. `sanguine render --delta-e X` takes the cheapest of these points with an error of X or less.
+The error of a setting is the 95th percentile of Delta E 2000, denoised, mean of {", ".join(JUDGED)} and of their skins. Not the sheet, lit from behind: no setting of a quality mends it; the effect *Thin parts* does ([thin parts](thin_parts.md)), which was off. **The rule**: a preset is the cheapest measured setting whose error is at most {", ".join(f"{x:g} ({n})" for n, x in PRESET_RULE.items())} times the least that the settings open to it reached; {" and ".join(WHOLE)} keep the whole material ({" and ".join(map(str, WHOLE.values()))} lobes or more, table step {USUAL.table_step:g} or finer, maps of {USUAL.map_size} or more), because tests hold at those settings alone what these scenes do not show: the fall-off of very dark skin, the table while sliders move. A shot without `quality` is `final`. `sanguine render --delta-e X` takes the cheapest of these points with an error of X or less.
 
 {_table(["preset", "lobes", "step", "map", "samples", "Delta E", "prepare s", "s per megapixel", f"s of {MEGAPIXELS:.2f} megapixels with preparation"], [point_row(n, p) for n, p in names])}
 The table holds the presets and the front of {len(LOBES)} x {len(SAMPLES)} lobes and samples with all tables and maps, but for points that gain less than 1 % on a faster one.

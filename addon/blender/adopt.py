@@ -10,6 +10,7 @@ import sanguine_core
 
 from ..app.tasks import Tasks, TaskRunner, run_tasks
 from ..domain.effects import EFFECTS
+from ..domain.facs import ARKIT
 from ..domain.naming import recognise
 from ..domain.parameters import PARAMETERS
 from ..domain.people import SEXES, TONES, person
@@ -66,6 +67,7 @@ def adopt_tasks(context: bpy.types.Context, face: bpy.types.Object, tone: str, s
     rig = controls_of(face) or new_rig(context, face)
     driven = put_controls(rig, face)
     said.warnings += driven.occupied and [f"{len(driven.occupied)} shape keys are driven by something else, and left alone"]
+    _say_missing(context.scene, face, rig, said)
     measure_maps(face)
     if regions := find_face_regions(face):
         (said.lines if regions.startswith("regions found") else said.warnings).append(regions)
@@ -85,9 +87,41 @@ def _say_names(face: bpy.types.Object, said: Adopted) -> None:
         why = f"none of {len(names)} shape keys is known" if names else "the face has no shape keys"
         said.warnings.append(f"{why}: sliders move its blood, not its shape")
         return
-    known = f"{found.convention} names: {len(found.mapping)} of {len(names)} shape keys are known"
-    missing = f"; nothing does the work of {', '.join(found.missing)}" if found.missing else ""
-    said.lines.append(known + missing)
+    said.lines.append(f"{found.convention} names: {len(found.mapping)} of {len(names)} shape keys are known")
+
+
+def _say_missing(scene: bpy.types.Scene, face: bpy.types.Object, rig: bpy.types.Object, said: Adopted) -> None:
+    """Which of ARKit's keys no mesh of the rig has, and where else they are: tongue and teeth are often meshes apart.
+
+    Those are not driven unasked: whether a mesh beside the rig is of the same character, its names do not tell.
+    """
+    followed = {face, *rig.children}
+    if not (own := _expressed(face)):
+        return  # said already: nothing of the face is known
+    here = own.union(*map(_expressed, followed))
+    missing, elsewhere = [key for key in ARKIT.keys if key not in here], set()
+    for mesh in scene.objects:
+        if mesh in followed or has_skin(mesh) or not (held := [key for key in missing if key in _expressed(mesh)]):
+            continue
+        elsewhere.update(held)
+        said.warnings.append(
+            f"'{mesh.name}' has {_few(held)}, and is not on the rig: if it is this character's, parent it to '{rig.name}' and "
+            "apply the skin"
+        )
+    if rest := [key for key in missing if key not in elsewhere]:
+        said.lines.append(f"no mesh has a shape key for {_few(rest)}: these stay still")
+
+
+def _expressed(mesh: bpy.types.Object) -> frozenset[str]:
+    """The ARKit keys that a mesh's shape keys do the work of."""
+    keys = getattr(mesh.data, "shape_keys", None) if mesh.type == "MESH" else None
+    found = recognise([block.name for block in keys.key_blocks[1:]] if keys else ())
+    return frozenset(ARKIT.keys) - set(found.missing) if found.convention else frozenset()
+
+
+def _few(names: list[str], shown: int = 6) -> str:
+    more = len(names) - shown
+    return ", ".join(names[:shown]) + (f" and {more} more" if more > 0 else "")
 
 
 def _draw_person(face: bpy.types.Object, tone: str) -> str:

@@ -136,7 +136,8 @@ def adopted(face, **options):
 def test_it_says_what_it_found():
     face = make_face()
     said = adopted(face)
-    assert said.lines[0].startswith("ict names: 8 of 9 shape keys are known; nothing does the work of ")
+    assert said.lines[0] == "ict names: 8 of 9 shape keys are known"
+    assert "no mesh has a shape key for browInnerUp, browOuterUpLeft," in said.lines[3] and "and 38 more" in said.lines[3]
     assert "measures 240 mm" in said.lines[1]
     assert "the skin of the panel" in said.lines[2]
     other = make_face("other", keys=())
@@ -145,6 +146,29 @@ def test_it_says_what_it_found():
     assert "no shape keys" in warnings[0] and "no regions" in warnings[1]
     third = make_face("third", keys=("one", "two"))
     assert "none of 2 shape keys is known" in adopted(third).warnings[0]
+
+
+def test_keys_of_a_mesh_beside_the_rig_are_named_and_follow_when_it_is_parented():
+    tongue = make_face("tongue", material=None, keys=("jawOpen", "TongueOut"))
+    make_face("helmet", material=None, keys=())
+    face = make_face()
+    said = adopted(face)
+    (line,) = [line for line in said.warnings if "tongueOut" in line]
+    assert line.startswith("'tongue' has tongueOut, and is not on the rig: ") and "parent it to 'face controls'" in line
+    assert not any("tongueOut" in line for line in said.lines) and tongue.data.shape_keys.animation_data is None
+    tongue.parent = face.parent
+    select(face)
+    assert bpy.ops.sanguine.apply_skin() == {"FINISHED"}
+    sliders.set_controls(face.parent, {"AU19": 1.0, "AU26": 1.0})  # not through closed lips
+    bpy.context.view_layer.update()
+    assert tongue.data.shape_keys.key_blocks["TongueOut"].value > 0.9
+    removal.remove_skin(face)
+    assert tongue.data.shape_keys.animation_data is None
+    tongue.parent = rig = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    bpy.context.collection.objects.link(rig)
+    face.parent = rig
+    again = adopted(face)
+    assert not any("tongueOut" in line for line in again.lines + again.warnings), "on the rig it is driven"
 
 
 def test_a_face_without_a_picture_is_a_drawn_person_unless_the_panel_was_used():

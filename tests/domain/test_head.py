@@ -300,6 +300,29 @@ def test_a_spoilt_target_is_refused(broken, line):
         HeadPackage(broken).face_unit("jawOpen")
 
 
+def test_a_spoilt_archive_is_one_line_wherever_it_is_spoilt(tmp_path):
+    """One byte changed, each in turn, and cut short at each: no traceback of gzip's or zlib's."""
+    path = tmp_path / "mpfb2/targets/nose/nose-hump-incr.target.gz"
+    path.parent.mkdir(parents=True)
+    # Name and time in the header of an archive are not checked by anybody, so there are none.
+    whole = gzip.compress(b"".join(b"%d 0.25 0 0.125\n" % i for i in range(0, 19000, 97)), mtime=0)
+    path.write_bytes(whole)
+    index, _ = HeadPackage(tmp_path).morph("nose/nose-hump-incr")
+    assert len(index) == 196
+    spoilt = [whole[:i] + bytes([whole[i] ^ 0x55]) + whole[i + 1 :] for i in range(10, len(whole))]
+    for raw in (*spoilt, *(whole[:i] for i in range(1, len(whole)))):
+        path.write_bytes(raw)
+        with pytest.raises(HeadError, match=r"^nose-hump-incr\.target\.gz: cannot be read [^\n]*: pip install [^\n]*$"):
+            HeadPackage(tmp_path).morph("nose/nose-hump-incr")
+
+
+def test_the_files_of_the_extension_are_mended_by_the_extension(broken, monkeypatch):
+    monkeypatch.setattr("sanguine.domain.head.package.bundled", lambda name: broken)
+    (broken / "mpfb2/3dobjs/base.obj").write_text("")
+    with pytest.raises(HeadError, match="^base.obj: .*: install the extension again$"):
+        HeadPackage().base_mesh()
+
+
 def test_a_target_outside_the_package_is_refused(package, tmp_path):
     outside = tmp_path / "x.target.gz"
     outside.write_bytes(gzip.compress(b"1 0 0 1\n"))

