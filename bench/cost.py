@@ -327,7 +327,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         results["noise"] = {name: noise(stage, name, Path(folder)) for name in names}
     stage.size(PIXELS)
-    richer = with_strengths(plan, mottle=1.0, diffuse_relief=0.0)
+    richer = with_strengths(plan, diffuse_relief=0.0)
     for shading in (NODES, OSL):
         of = effects_alone(stage, richer, shading)
         taken = timed(stage, list(of.values()), options.rounds)

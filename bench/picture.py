@@ -49,7 +49,7 @@ MAP_SIZES = (256, 512, 1024, 2048)
 # What shots were rendered with before there were presets.
 USUAL = Settings(lobes=4, table_step=1.0, map_size=1024, samples=64)
 # The skin whose table and maps are timed: what every face has. What grows on some costs more, see docs/maps.md.
-PREPARED = {"anatomy": 1.0, "mottle": 0.6, "relief": 1.0}
+PREPARED = {"anatomy": 1.0, "relief": 1.0}
 # A picture for the time of a setting: the size of examples/five_expressions.toml.
 MEGAPIXELS = 512 * 640 / 1e6
 # Darker pixels are not compared: below L* = 2 nothing is seen, and the truth has little but noise there.

@@ -54,7 +54,7 @@ def skin_material(skin: Skin, lobes: int) -> bpy.types.Material:
 def mapped_plan(skin: Skin, settings: Settings) -> Plan:
     """The plan of a face with anatomy that goes through anger and fear: a table with three axes."""
     frames = (Frame("anger", {"anger": 1.0}), Frame("fear", {"fear": 1.0}))
-    strengths = check_strengths({"anatomy": 1.0, "mottle": 0.0, "relief": 0.0}, "bench")
+    strengths = check_strengths({"anatomy": 1.0, "relief": 0.0}, "bench")
     return make_plan(Scene(skin, frames, strengths, FACE_REGIONS), settings)
 
 

@@ -93,9 +93,10 @@ def test_a_constant_skin_map_is_what_skin_says():
 def test_a_tattoo_darkens_as_skin_says(monkeypatch):
     """Half a strength in the map's own sum: the map holds what is in the skin, on top of the skin's own ink."""
     declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0))
-    plan = plan_of(strengths={"inked": 1.0, "mottle": 0.01}, ink_per_mm=0.1)
+    plan = plan_of(strengths={"inked": 1.0, "mottle": 0.01}, ink_per_mm=0.1)  # mottle: for two axes more
     assert [axis.id for axis in plan.axes] == ["hemoglobin", "melanin", "ink_per_mm"]
-    thing = patch(lambda: build_skin_material("skin", plan, {"grown_ink": halves([0.0], [3.0])}))
+    maps = {"grown": halves([0.0] * 4, [0.0] * 4), "grown_ink": halves([0.0], [3.0])}
+    thing = patch(lambda: build_skin_material("skin", plan, maps))
     bare, inked = seen(thing, -1), seen(thing, 1)
     assert difference(bare, said(ink_per_mm=0.1)) < 1.5
     assert difference(inked, said(ink_per_mm=3.1)) < 1.5
@@ -250,12 +251,12 @@ def test_udim_tiles_are_in_the_file(tmp_path):
 def test_a_map_of_the_face_outlives_the_material():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     image = data_image("mine", halves(values(LIGHT), values(DARK)))
-    plan = plan_of({"skin_map": ranges(LIGHT, DARK)}, {"mottle": 0.5})
+    plan = plan_of({"skin_map": ranges(LIGHT, DARK)}, {"relief": 0.5})
     material = build_skin_material("skin", plan, {"skin_map": image})
     assert material[MARK]["effects"] and len(bpy.data.images) == 2  # the map and the table
     group = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup")
     names = {item.name for item in group.node_tree.interface.items_tree if item.in_out == "INPUT"}
-    assert "Melanin" not in names and "Mottle" in names  # no slider moves what the map holds
+    assert "Melanin" not in names and "Relief" in names  # no slider moves what the map holds
     remove_skin_material(material)
     assert list(bpy.data.images) == [image]
 

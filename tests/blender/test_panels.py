@@ -366,7 +366,7 @@ def test_other_nodes_are_a_change_only_when_asked_for(face):
 
 
 def test_numbers_that_move_nothing_by_themselves_cannot_be_keyed(face):
-    for name in (*PARAMETERS, "strength_mottle", "use_oil", "seed"):
+    for name in (*PARAMETERS, "strength_relief", "use_oil", "seed"):
         with pytest.raises(TypeError, match="not animatable"):
             face.sanguine.keyframe_insert(name)
 

@@ -75,7 +75,7 @@ def test_face_without_masks_has_no_regional_effect():
 @pytest.mark.parametrize("effect", [e for e in EFFECTS if e.id != "scattering"], ids=lambda e: e.id)
 def test_no_trace_of_an_inactive_effect(effect):
     """Neither its inputs nor its code are in the shader, whichever effect is off."""
-    full = scene(frames=({"anger": 1.0},), strengths={"mottle": 1, "relief": 1, "anatomy": 1}, oil=0.5)
+    full = scene(frames=({"anger": 1.0},), strengths={"relief": 1, "anatomy": 1}, oil=0.5)
     plan = make_plan(full)
     files = {fragment.file for fragment in effect.fragments(full)}
     assert files

@@ -166,9 +166,9 @@ def test_ink_is_an_axis_only_where_a_tattoo_is(monkeypatch, live):
 
 def test_a_declared_feature_that_is_off_changes_nothing(monkeypatch):
     frames = ({}, {"anger": 1.0})
-    plain = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
+    plain = make_plan(scene(frames, {"anatomy": 0.5, "relief": 0.5}))
     declare(monkeypatch, "inked", ink_per_mm=(0.0, 6.0), height_mm=(0.0, 0.1), log_oil=(0.0, 1.0))
-    plan = make_plan(scene(frames, {"mottle": 0.5, "relief": 0.5}))
+    plan = make_plan(scene(frames, {"anatomy": 0.5, "relief": 0.5}))
     assert sources(plan) == sources(plain) and plan.axes == plain.axes and plan.maps == plain.maps
     assert not {"grown", "skin_map", "residual"} & set(plan.maps)
     for text in sources(plan).values():

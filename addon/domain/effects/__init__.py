@@ -1,8 +1,8 @@
 """The effects, each declared in its module and listed here once, in the order in which they act."""
 
 from . import (
-    anatomy, diffuse_relief, grown, mottle, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map,
-    strain, thin, wrinkles,
+    anatomy, diffuse_relief, grown, oil, oxygenation, perfusion, pressure, relief, residual, scattering, skin_map, strain,
+    thin, wrinkles,
 )
 from .effect import ELSEWHERE, Activation, Bounds, Effect, Fragment, Frame, Growth, Scene, ShaderInput
 
@@ -13,7 +13,6 @@ EFFECTS: tuple[Effect, ...] = (
     *grown.EFFECTS,  # before perfusion: blood comes on top of what has grown
     perfusion.EFFECT,
     oxygenation.EFFECT,
-    mottle.EFFECT,  # after perfusion: a flush is blotchy too
     strain.EFFECT,
     pressure.EFFECT,
     relief.EFFECT,

@@ -8,6 +8,7 @@ std::span<const Feature* const> features() {
     static const std::array all{
         // What all skin has.
         &splotches_feature(),
+        &mottle_feature(),
         &vessels_feature(),
         &pores_feature(),
         &sebum_feature(),

@@ -10,6 +10,7 @@ const Feature& beard_feature();
 const Feature& freckles_feature();
 const Feature& lentigines_feature();
 const Feature& moles_feature();
+const Feature& mottle_feature();
 const Feature& periorbital_feature();
 const Feature& pores_feature();
 const Feature& rash_feature();
