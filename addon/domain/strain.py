@@ -1,8 +1,8 @@
 """Strain of a face that its shape keys move, compressed into few maps: where blood goes, where skin folds.
 
-Of some fifty keys a few components are kept: a map each, and for every key and half of the face the coefficient by
-which its value drives the map there. Coefficients are fitted to the exact strain of single keys, action units and
-emotions, so that keys may simply add up; docs/strain.md has what that leaves out.
+Of all keys of a face (68 on the example head) a few components are kept: a map each, and for every key and half of the
+face the coefficient by which its value drives the map there. Coefficients are fitted to the exact strain of single keys,
+action units and emotions, so that keys may simply add up; docs/strain.md has what that leaves out.
 """
 
 from __future__ import annotations
