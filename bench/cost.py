@@ -21,15 +21,19 @@ from typing import Any
 import bpy
 import numpy as np
 from beside_principled import stock_skin
+from sanguine.app.maps import bake_maps
 from sanguine.blender.controls import CONTROL_BONE, CONTROLS, set_controls
+from sanguine.blender.images import data_image
 from sanguine.blender.material import MARK
 from sanguine.blender.render import BlenderRenderer, quiet
-from sanguine.blender.skin import apply_skin
-from sanguine.domain.effects import EFFECTS
+from sanguine.blender.skin import apply_skin, needed_sizes
+from sanguine.blender.surface import read_surface
+from sanguine.domain.effects import EFFECTS, grown
 from sanguine.domain.parameters import skin_from
 from sanguine.domain.plan import Plan, make_plan
 from sanguine.domain.shading import NODES, OSL
 from sanguine.domain.shot import Shot, jobs, pose_of, read_shot, scene_of
+from sanguine.domain.udim import FIRST_TILE
 
 ROOT = Path(__file__).resolve().parents[1]
 SHOT = ROOT / "examples/five_expressions.toml"
@@ -158,7 +162,7 @@ def floor_skin(skin: dict[str, float]) -> bpy.types.Material:
     return material
 
 
-def artists_skin(stage: Stage, skin: dict[str, float]) -> bpy.types.Material:
+def artists_skin(stage: Stage, skin: dict[str, float], plan: Plan) -> bpy.types.Material:
     """The stock skin with what an artist paints for it: the same skin's colours as a map, and its relief as a bump."""
     material = stock_skin(skin)
     tree = material.node_tree
@@ -166,19 +170,15 @@ def artists_skin(stage: Stage, skin: dict[str, float]) -> bpy.types.Material:
     colour = tree.nodes.new("ShaderNodeTexImage")
     colour.image = baked_colour(stage)
     tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
-    heights = next((node.image for node in _group(stage, NODES).nodes if node.label == "grown_height"), None)
-    if heights is not None:
+    names = [height for name in plan.maps if (height := grown.height_of(name)) == "grown_height"]
+    surface = read_surface(stage.face)
+    for name, tiles in bake_maps(plan, surface, needed_sizes(stage.face, surface, plan), names=names).items():
         height, bump = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeBump")
-        height.image = heights
+        height.image = data_image(name, tiles[FIRST_TILE], half=True)
         bump.inputs["Distance"].default_value = 0.001
         tree.links.new(height.outputs["Color"], bump.inputs["Height"])
         tree.links.new(bump.outputs["Normal"], shader.inputs["Normal"])
     return material
-
-
-def _group(stage: Stage, shading: str) -> bpy.types.NodeTree:
-    material, _ = stage.materials[SANGUINE[shading]]
-    return next(node.node_tree for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup")
 
 
 def baked_colour(stage: Stage, size: int = 1024) -> bpy.types.Image:
@@ -310,7 +310,7 @@ def main() -> None:
         stage.add_sanguine(SANGUINE[shading], plan, shading)
     skin = skin_from(subject.skin, "skin")
     stage.add(STOCK, stock_skin(skin), False)
-    stage.add(STOCK_MAPS, artists_skin(stage, skin), False)
+    stage.add(STOCK_MAPS, artists_skin(stage, skin, plan), False)
     stage.add(FLOOR, floor_skin(skin), False)
     names = [STOCK, STOCK_MAPS, FLOOR, BLOOD, PAINTED, SMOOTH, SANGUINE[NODES], SANGUINE[OSL]]
     results: dict[str, Any] = {

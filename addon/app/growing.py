@@ -134,7 +134,8 @@ def chromophore_maps(
     Fractions within the ranges of the schema, `ink_per_mm` and `height_mm` in their units. Where there is no skin, a map
     holds the skin's own values: neutral for every filter.
     """
-    maps = bake_maps(plan, surface, MapSizes(size, size), cache, progress)
+    names = [grown.height_of(name) or name for name in plan.maps]
+    maps = bake_maps(plan, surface, MapSizes(size, size), cache, progress, names)
     beside = [name for name in _BESIDE if name in maps]
     channels = CHROMOPHORES + tuple(_BESIDE[name] for name in beside)
     tiles = {}

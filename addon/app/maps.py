@@ -7,7 +7,7 @@ cache holds: a layer is kept by the face, the feature and the person, so a chang
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from ..domain.effects import wrinkles as wrinkles_effect
 from ..domain.effects.regions import region_images
 from ..domain.errors import InputError
 from ..domain.plan import Plan, make_plan
+from ..domain.slopes import TexelAxes, texel_axes
 from ..domain.texel_density import MapSizes
 from ..domain.udim import FIRST_TILE, tile_offset, tiles_of
 from .map_cache import MapCache, key_of
@@ -110,13 +111,26 @@ class Grown:
         self._layers: dict[str, np.ndarray] = {}  # a feature may write to several maps
 
     @cached_property
-    def _texels(self) -> sanguine_core.TexelMap:
+    def texel(self) -> np.ndarray:
+        """(N,) uint32: row * size + column of the texels that the layers have values for."""
+        return self.cache.get(key_of(self.key, "texel"), lambda: np.asarray(self.places.texel))
+
+    @cached_property
+    def places(self) -> sanguine_core.TexelMap:
+        """What the texels show."""
         return self.surface.native.texels(self.size, self.size, _PADDING)
 
     @cached_property
-    def texel(self) -> np.ndarray:
-        """(N,) uint32: row * size + column of the texels that the layers have values for."""
-        return self.cache.get(key_of(self.key, "texel"), lambda: np.asarray(self._texels.texel))
+    def axes(self) -> TexelAxes:
+        face = self.surface
+        return texel_axes(face.position_mm, face.uv, face.triangles, face.corner_vertex, self.size, _PADDING)
+
+    @cached_property
+    def for_wrinkles(self) -> Grown:
+        """The same at the size of wrinkles."""
+        if self.size <= LARGEST_WRINKLES:
+            return self
+        return Grown(self.surface, self.growth, LARGEST_WRINKLES, self.cache)
 
     def layer(self, feature: str, progress: Progress | None = None) -> np.ndarray:
         """(N, C) float16, channels in the order of the feature's row. Half is what the material's maps hold too."""
@@ -124,7 +138,7 @@ class Grown:
         def paint() -> np.ndarray:
             growth = self.growth
             return sanguine_core.grow(
-                feature, self.surface.native, self._texels, growth.seed, growth.age_years, growth.sun, growth.masculinity,
+                feature, self.surface.native, self.places, growth.seed, growth.age_years, growth.sun, growth.masculinity,
                 progress=progress,
             ).astype(np.float16)
 
@@ -161,23 +175,34 @@ class Grown:
 
 
 def bake_maps(
-    plan: Plan, surface: Surface, sizes: MapSizes, cache: MapCache | None = None, progress: Progress | None = None
+    plan: Plan,
+    surface: Surface,
+    sizes: MapSizes,
+    cache: MapCache | None = None,
+    progress: Progress | None = None,
+    names: Sequence[str] | None = None,
 ) -> dict[str, dict[int, np.ndarray]]:
     """The maps that a plan makes from the face itself, alike on both sides of its UV seams; nothing unasked for.
 
-    Returns map id -> UDIM tile -> square (H, W, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`,
-    called with what is done and what there is to do, answers False.
+    names: those that are wanted, `plan.maps` if left out; heights have a name too (`grown.height_of`). Returns map id ->
+    UDIM tile -> square (H, W, 1, 3 or 4) float32, row 0 lowest. Raises Cancelled when `progress`, called with what is done
+    and what there is to do, answers False.
     """
     cache = cache or MapCache()
     made: dict[str, dict[int, np.ndarray]] = {}
     for tile in surface.tiles if plan.maps else ():
         layers = Grown(surface.at_tile(tile), plan.scene.growth, sizes.detail, cache, progress)
-        for name in plan.maps:
+        for name in plan.maps if names is None else names:
             if (image := _bake(name, plan, layers, sizes.smooth)) is not None:
                 made.setdefault(name, {})[tile] = image
-    for images in made.values():
-        hide_seams(surface, images, cache)
+    for name, images in made.items():
+        if not _is_slope(name):  # whose numbers differ on the sides of a seam as the axes do
+            hide_seams(surface, images, cache)
     return made
+
+
+def _is_slope(name: str) -> bool:
+    return grown.height_of(name) is not None or name in wrinkles_effect.IMAGES
 
 
 def hide_seams(surface: Surface, images: Mapping[int, np.ndarray], cache: MapCache) -> None:
@@ -225,15 +250,19 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
     if name in grown.MAPS:
         strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
         return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
+    if (height := grown.height_of(name)) is not None:
+        heights = _bake(height, plan, layers, size)
+        return cache.get(key_of(layers.key, name, heights), lambda: _slopes(layers, heights))
     if (feature := grown.feature_of(name)) is not None:
         return cache.get(key_of(layers.key, name), lambda: layers.compose({feature: 1.0}, grown.channels_of(name)))
     if name in strain_effect.IMAGES:
         key = key_of(face.motion_digest, name, size, _PADDING)
         return cache.get(key, lambda: _strain(face, size, strain_effect.IMAGES.index(name)))
     if name in wrinkles_effect.IMAGES:
-        size = min(layers.size, LARGEST_WRINKLES)
-        key = key_of(face.motion_digest, name, size, _PADDING)
-        return cache.get(key, lambda: _wrinkles(face, size, wrinkles_effect.IMAGES.index(name)))
+        layers = layers.for_wrinkles
+        axis = next(axis for axis, images in enumerate(wrinkles_effect.SLOPES) if name in images)
+        key = key_of(face.motion_digest, name, layers.size, _PADDING)
+        return cache.get(key, lambda: _wrinkles(layers, wrinkles_effect.SLOPES[axis].index(name), axis))
     return None
 
 
@@ -254,19 +283,27 @@ def _strain(face: Surface, size: int, image: int) -> np.ndarray:
     return _draw(face, size, face.moving.area.values[4 * image : 4 * image + 4].T, np.zeros(4, dtype=np.float32))
 
 
-def _wrinkles(face: Surface, size: int, image: int) -> np.ndarray:
-    """Heights in mm of four fold patterns, (size, size, 4)."""
-    depth, phase = face.furrows
-    four = slice(4 * image, 4 * image + 4)
-    per_vertex = np.vstack([face.position_mm.T, depth[four], phase[four]]).T
-    drawn = _draw(face, size, per_vertex, np.zeros(11, dtype=np.float32))
-    heights = np.zeros((size, size, 4), dtype=np.float32)
+def _slopes(layers: Grown, height_mm: np.ndarray) -> np.ndarray:
+    """Slopes of a map of heights (size, size, 1), along the tangent and the bitangent, and 0: (size, size, 3)."""
+    slopes = [layers.axes.slopes(height_mm, axis) for axis in (0, 1)]
+    return np.concatenate([*slopes, np.zeros_like(slopes[0])], axis=2)
+
+
+def _wrinkles(layers: Grown, image: int, axis: int) -> np.ndarray:
+    """Slopes of four fold patterns along the tangent (axis 0) or the bitangent (1), (size, size, 4). Beyond the edge of a UV
+    island the heights are those of the skin there, for the slopes at the edge."""
+    face, shown = layers.surface, layers.places
+    vertex, share = face.corner_vertex[face.triangles[shown.triangle]], np.asarray(shown.barycentric)
+    fields = (*face.furrows, wrinkles.steepening(face.moving))
+    slopes = np.zeros((layers.size * layers.size, 4), dtype=np.float32)
     for i in range(4):
-        at = drawn[..., 3 + i] > 0.0
-        heights[at, i] = wrinkles.furrow_height_mm(
-            drawn[at, 3 + i], drawn[at, 7 + i], drawn[at, :3], seed=4 * image + i
-        )
-    return heights
+        depth, phase, steeper = ((field[4 * image + i][vertex] * share).sum(axis=1) for field in fields)
+        at = depth > 0.0
+        height = np.zeros(layers.size * layers.size, dtype=np.float32)
+        height[shown.texel[at]] = wrinkles.furrow_height_mm(depth[at], phase[at], shown.place_mm[at], seed=4 * image + i)
+        slope = layers.axes.slopes(height.reshape(layers.size, layers.size, 1), axis)
+        slopes[shown.texel, i] = steeper * slope.ravel()[shown.texel]
+    return slopes.reshape(layers.size, layers.size, 4)
 
 
 def _masks(face: Surface, size: int, regions: tuple[str, ...]) -> np.ndarray:

@@ -126,7 +126,7 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map], shading
     tree.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
     shaders = assemble(plan)
     build.points = points = build.script("chromophores", shaders["chromophores"])
-    lobes = build.script("surface", shaders["surface"], ("Normal",) if "relief" in shaders else ())
+    lobes = build.script("surface", shaders["surface"], ("Normal",) if {"slopes", "relief"} & set(shaders) else ())
     build.base_values(points)
     unit_per_mm = 1.0 / (_MM_PER_M * bpy.context.scene.unit_settings.scale_length)
     lobes.inputs["unit_per_mm"].default_value = unit_per_mm
@@ -135,11 +135,18 @@ def _group(name: str, plan: Plan, table: Table, maps: Mapping[str, Map], shading
     else:
         for socket, value in zip(lobe_sockets(table.lobes, walk=table.walk), table.image.reshape(-1, 3), strict=True):
             lobes.inputs[socket].default_value = (*value.tolist(), 1.0)
+    normal = lobes.inputs.get("Normal")  # plain nodes have it where it is linked
     if "relief" in shaders:
         bump = build.node("ShaderNodeBump")
         bump.inputs["Distance"].default_value = unit_per_mm
         build.link(build.script("relief", shaders["relief"]).outputs["height_mm"], bump.inputs["Height"])
-        build.link(bump.outputs["Normal"], lobes.inputs["Normal"])
+        build.link(bump.outputs["Normal"], normal)
+        normal = bump.inputs["Normal"]
+    if "slopes" in shaders:
+        # In the tangent space of the active render UV map, by which Image Texture nodes without a vector read too.
+        bent = build.node("ShaderNodeNormalMap")
+        build.link(build.script("slopes", shaders["slopes"]).outputs["tangent_normal"], bent.inputs["Color"])
+        build.link(bent.outputs["Normal"], normal)
     end = build.node("NodeGroupOutput")
     shown = lobes.outputs["BSDF"]
     if "leaving" in lobes.outputs:
@@ -290,7 +297,10 @@ class _Builder:
     def arrange(self, points: bpy.types.Node, lobes: bpy.types.Node, end: bpy.types.Node) -> None:
         """Columns from left to right, so that a person can read the group."""
         points.location, lobes.location, end.location = (0, 0), (900, 0), (1200, 0)
-        columns = {"ShaderNodeAttribute": -600, "ShaderNodeVectorMath": 300, "ShaderNodeBump": 600, "ShaderNodeScript": 300}
+        columns = {
+            "ShaderNodeAttribute": -600, "ShaderNodeVectorMath": 300, "ShaderNodeBump": 600, "ShaderNodeNormalMap": 600,
+            "ShaderNodeScript": 300,
+        }
         heights: dict[int, int] = {}
         self.begin.location = (-600, 500)
         for node in self.tree.nodes:

@@ -72,13 +72,13 @@ def skin_tasks(
     plan, space = reached(plan, maps), working_space()
     table = yield Task("Solving skin", lambda progress: bake(plan.axes, plan.skin, space, progress, plan.settings.lobes, plan.walk))
     components = []
-    for images, solve, one_sided in (
-        (strain.IMAGES, strain_coefficients, False),
-        (wrinkles.IMAGES, wrinkle_coefficients, True),
+    for images, driven, solve, one_sided in (
+        (strain.IMAGES, strain.IMAGES, strain_coefficients, False),
+        (wrinkles.IMAGES, wrinkles.DRIVEN, wrinkle_coefficients, True),
     ):
         if set(images) & set(maps):
             coefficients = yield Task("Following shape keys", lambda _progress, solve=solve: solve(surface))
-            components.append((images, coefficients, one_sided))
+            components.append((driven, coefficients, one_sided))
     before = face.material_slots[slot].material if face.material_slots else None
     material = build_skin_material(f"{face.name} skin", plan, maps, table, chosen.shading)
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs}
@@ -97,8 +97,8 @@ def skin_tasks(
             drive_settled(armature, face, {name for parts in plan.packed.values() for name in parts})
         drive_packed(face, plan.packed)
         remove_components(face)
-        for images, coefficients, one_sided in components:
-            drive_components(face, images, surface.keys.names, coefficients, one_sided)
+        for driven, coefficients, one_sided in components:
+            drive_components(face, driven, surface.keys.names, coefficients, one_sided)
     except BaseException:
         face.material_slots[slot].material = before
         remove_skin_material(material)

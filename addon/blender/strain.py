@@ -25,15 +25,15 @@ _PART = "_part"
 
 
 def drive_components(
-    face: bpy.types.Object, images: Sequence[str], keys: Sequence[str], coefficients: np.ndarray, one_sided: bool
+    face: bpy.types.Object, driven: Sequence[str], keys: Sequence[str], coefficients: np.ndarray, one_sided: bool
 ) -> None:
-    """Puts the driven properties `<image>_left`, …, of `packed_components` on `face`.
+    """Puts the driven properties `<driven>_left`, …, of `packed_components` on `face`.
 
-    coefficients: (2, C, K), four components per image. one_sided: what is below 0 counts as 0. A sum too long for one
+    coefficients: (2, C, K), four components each. one_sided: what is below 0 counts as 0. A sum too long for one
     driver is taken in parts, each a property of its own.
     """
     for half, name in enumerate(HALVES):
-        for stem, held in strain.packed_components(tuple(images)).items():
+        for stem, held in strain.packed_components(tuple(driven)).items():
             rows = [coefficients[half, i] for i in held]
             sums = [key_sums({k: c for k, c in zip(keys, row, strict=True) if abs(c) >= LEAST}) for row in rows]
             _drive_property(face, f"{stem}_{name}", sums, one_sided)
@@ -41,7 +41,7 @@ def drive_components(
 
 def remove_components(face: bpy.types.Object) -> None:
     """Removes the properties of `drive_components` and their drivers, also as versions before 3 had them."""
-    stems = [stem for images in (strain.IMAGES, wrinkles.IMAGES) for stem in strain.packed_components(images)]
+    stems = [stem for driven in (strain.IMAGES, wrinkles.DRIVEN) for stem in strain.packed_components(driven)]
     ours = {f"{stem}_{half}" for stem in stems for half in HALVES}
     for name in [key for key in face.keys() if key.partition(_PART)[0] in ours]:
         face.driver_remove(f'["{name}"]', -1)

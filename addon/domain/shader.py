@@ -1,7 +1,8 @@
 """The OSL shaders of a plan, assembled from `shaders_osl/` and the fragments of the active effects.
 
 `chromophores.osl` says what is in the skin at a point and where the table holds it; Image Texture nodes read the
-table; `surface.osl` turns what they read into closures; `relief.osl`, if an effect needs it, bends the normal.
+table; `surface.osl` turns what they read into closures. The normal is bent by `slopes.osl`, by what is painted, and by
+`relief.osl`, by what is computed, each if an effect needs it.
 What the plan leaves out is not in the text: no input, no instruction.
 """
 
@@ -25,7 +26,7 @@ class Shader:
 
 
 def assemble(plan: Plan) -> dict[str, Shader]:
-    """Stage -> shader: "chromophores" and "surface", and "relief" when an active effect has a fragment for it."""
+    """Stage -> shader: "chromophores" and "surface"; "slopes" and "relief" when an active effect has a fragment for them."""
     stages = {fragment.stage for fragment in plan.fragments}
     from_points = {item.key for f in plan.fragments for item in f.inputs if item.source == "chromophores"}
     axes = plan.axes
@@ -61,8 +62,9 @@ def assemble(plan: Plan) -> dict[str, Shader]:
             lobes=_lobe_inputs(plan),
         ),
     }
-    if "relief" in stages:
-        shaders["relief"] = _assemble("relief", plan.fragments, {})
+    for stage in ("slopes", "relief"):
+        if stage in stages:
+            shaders[stage] = _assemble(stage, plan.fragments, {})
     return shaders
 
 

@@ -10,9 +10,9 @@ import sanguine_core
 from sanguine.app.faces import example_head, head_surface
 from sanguine.app.growing import chromophore_maps, maps_plan
 from sanguine.app.map_cache import MapCache
-from sanguine.app.maps import LARGEST_WRINKLES, Grown, Surface, _strain, _wrinkles, bake_maps, hide_seams
+from sanguine.app.maps import Grown, Surface, _slopes, _strain, bake_maps, hide_seams
 from sanguine.domain.effects import Growth
-from sanguine.domain.effects.grown import MAPS, ROWS
+from sanguine.domain.effects.grown import MAPS, ROWS, height_of
 from sanguine.domain.parameters import default_skin
 from sanguine.domain.plan import check_strengths
 from sanguine.domain.texel_density import MapSizes
@@ -73,7 +73,7 @@ def test_no_map_of_a_face_shows_a_seam(face):
     plan = maps_plan(default_skin(), check_strengths(strengths, "test"), face, GROWTH)
     uv = seam_uv(face)
     assert len(uv[0]) > 3000
-    maps = bake_maps(plan, face, SIZES, MapCache(None))
+    maps = bake_maps(plan, face, SIZES, MapCache(None), names=[height_of(name) or name for name in plan.maps])
     assert {"anatomy", *MAPS} <= maps.keys()
     for name, tiles in maps.items():
         assert (difference(tiles[1001], uv) / wide(tiles[1001])).max() < AGREES, name
@@ -95,15 +95,25 @@ def test_nor_does_a_map_of_chromophores(female):
     assert (difference(tiles[1001], seam_uv(female)) / wide(tiles[1001])).max() < AGREES
 
 
-@pytest.mark.parametrize("make, size", [(_strain, 256), (_wrinkles, 1024)])
-def test_nor_do_maps_of_a_moving_face(female, make, size):
-    assert size <= LARGEST_WRINKLES
+def test_nor_does_a_map_of_a_moving_face(female):
     uv = seam_uv(female)
-    image = make(female, size, 0)
+    image = _strain(female, 256, 0)
     range_of = wide(image)
     assert (difference(image, uv) / range_of).max() > 5 * AGREES  # there is something to hide
     hide_seams(female, {1001: image}, MapCache(None))
     assert (difference(image, uv) / range_of).max() < AGREES
+
+
+def test_slopes_are_as_steep_on_both_sides(female, layers):
+    """They are told along axes that differ from island to island. Of waves of 12 mm, whose slope changes by a sixth of the
+    steepest within the 0.3 mm of a texel (more where the layout crams skin together). The median, because many seams run
+    along folds, lips and lids, of which the sides differ in truth."""
+    heights = np.zeros((SIZES.detail**2, 1), dtype=np.float32)
+    heights[layers.places.texel, 0] = np.sin(layers.places.place_mm * (2.0 * np.pi / 12.0)).sum(axis=1)
+    slopes = _slopes(layers, heights.reshape(SIZES.detail, SIZES.detail, 1))
+    steep = np.hypot(slopes[..., 0], slopes[..., 1])[..., None]
+    here, there = (look_up(steep, uv) for uv in seam_uv(female))
+    assert np.median(np.abs(here - there)) < 0.06 * np.percentile(steep[steep > 0.0], 99)
 
 
 def test_only_texels_at_seams_change_and_nothing_leaves_its_range(female, layers):

@@ -145,5 +145,5 @@ def test_progress_is_told_and_can_stop_it(face):
 def test_a_feature_that_writes_two_maps_is_painted_once(face):
     (one, _), maps = work(plan_of(face, freckles=1.0), face, MapCache(None))
     (two, _), more = work(plan_of(face, moles=1.0), face, MapCache(None))
-    assert set(maps) == {"grown"} and set(more) == {"grown", "grown_height"}
+    assert set(maps) == {"grown"} and set(more) == {"grown", "grown_slope"}
     assert two == one

@@ -129,7 +129,7 @@ def test_grown_factors_are_what_skin_says(monkeypatch):
 def test_what_a_state_brings_out_follows_the_object():
     """One material: its strength is a property of the object, and more of it than the whole layer is the whole layer."""
     plan = make_plan(Scene(default_skin() | {"oil": 0.0}, (Frame("0", {"rash": 1.0}),), {"anatomy": 0.0}))
-    maps = {"keyed_rash": halves([0.0, 0.0, 0.0, 0.0], [1.2, 0.0, 0.0, 0.1]), "keyed_rash_height": halves([0.0], [0.0])}
+    maps = {"keyed_rash": halves([0.0, 0.0, 0.0, 0.0], [1.2, 0.0, 0.0, 0.1]), "keyed_rash_slope": halves([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])}
     thing = patch(lambda: build_skin_material("skin", plan, maps))
     drive_packed(thing, plan.packed)
     skin = default_skin()
@@ -152,14 +152,14 @@ def test_a_residual_multiplies_and_never_makes_light():
     np.testing.assert_allclose(white, 1.0, atol=0.01)
 
 
-def test_height_bends_the_light(monkeypatch):
-    """Waves of 0.1 mm under a low sun are bands of light; a height that is the same everywhere is no relief."""
+def test_slopes_bend_the_light(monkeypatch):
+    """Waves of 0.1 mm under a low sun are bands of light; no slope is no relief."""
     declare(monkeypatch, "bumpy", height_mm=(-0.1, 0.1))
     plan = plan_of(strengths={"bumpy": 1.0, "diffuse_relief": 1.0})
 
-    def spread(height):
+    def spread(slope):
         def material():
-            return build_skin_material("skin", plan, {"grown_height": height[..., None].astype(np.float32)})
+            return build_skin_material("skin", plan, {"grown_slope": (slope[..., None] * [1.0, 0.0, 0.0]).astype(np.float32)})
 
         patch(material)
         bpy.context.scene.world = None
@@ -170,8 +170,9 @@ def test_height_bends_the_light(monkeypatch):
         columns = render_linear().mean((0, 2))
         return columns.std() / columns.mean()
 
-    across = np.broadcast_to(np.sin(np.arange(512) * 0.3), (512, 512))  # about 8 mm from crest to crest
-    waves, flat = spread(0.1 * across), spread(np.full((512, 512), 0.1))
+    # About 8 mm from crest to crest: 0.3 of a radian to a texel of 0.39 mm.
+    across = np.broadcast_to(0.1 * 0.3 / 0.39 * np.cos(np.arange(512) * 0.3), (512, 512))
+    waves, flat = spread(across), spread(np.zeros((512, 512)))
     print(f"waves {waves:.3f}, flat {flat:.3f}")
     assert waves > 4 * flat
 

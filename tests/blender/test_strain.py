@@ -25,7 +25,7 @@ from sanguine.domain.plan import check_strengths, make_plan
 from support.patch import camera_above, empty_scene, plane, render_linear, white_world
 
 STRENGTHS = {"strain": 1.0, "wrinkles": 1.0, "anatomy": 0.0}
-PACKED = {k: v for images in (strain.IMAGES, wrinkles.IMAGES) for k, v in strain.packed_components(images).items()}
+PACKED = {k: v for images in (strain.IMAGES, wrinkles.DRIVEN) for k, v in strain.packed_components(images).items()}
 PROPERTIES = [f"{name}_{half}" for name in PACKED for half in strain.HALVES]
 
 
@@ -51,7 +51,7 @@ def driven(skin):
 def components(held):
     """The numbers of properties, each where its component is."""
     found = np.full((2, 2, domain_strain.COMPONENTS), np.nan)
-    for kind, images in enumerate((strain.IMAGES, wrinkles.IMAGES)):
+    for kind, images in enumerate((strain.IMAGES, wrinkles.DRIVEN)):
         for name, rows in strain.packed_components(images).items():
             for half, side in enumerate(strain.HALVES):
                 found[kind, half, list(rows)] = held[f"{name}_{side}"][: len(rows)]

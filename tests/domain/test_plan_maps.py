@@ -75,7 +75,7 @@ def test_a_state_brings_a_feature_out_by_a_strength_of_its_own():
     plan = make_plan(brought_out(0.5))
     rash = grown.ROWS["rash"]
     most = {change["channel"]: change["high"] for change in rash["changes"]}
-    assert plan.maps == ("keyed_rash", "keyed_rash_height")
+    assert plan.maps == ("keyed_rash", "keyed_rash_slope")
     assert axes(plan)["hemoglobin"].high == pytest.approx(default_skin()["hemoglobin"] * math.exp(0.5 * most["log_hemoglobin"]))
     assert axes(plan)["oxygenation"].high == pytest.approx(default_skin()["oxygenation"] + 0.5 * most["oxygenation"])
     inputs = {item.name: item.source for fragment in plan.fragments for item in fragment.inputs}
@@ -84,24 +84,24 @@ def test_a_state_brings_a_feature_out_by_a_strength_of_its_own():
     assert inputs[name] == "object" and inputs["keyed_rash"] == "map" and [part for part in parts if part] == ["blood_feature_rash"]
     text = sources(plan)
     assert f"keyed_rash[0] * clamp({number}, 0.0, 1)" in text["chromophores"] and "grown" not in inputs
-    assert f"keyed_rash_height[0] * clamp({number}, 0.0, 1)" in text["relief"]
+    assert f"vector(keyed_rash_slope) * clamp({number}, 0.0, 1)" in text["slopes"] and "relief" not in text
     assert "state of the body" in plan.decisions["rash"].because and plan.decisions["rash"].frames == ("still",)
 
 
 def test_what_is_brought_out_comes_on_top_of_what_is_there():
     """Together never more than the whole layer; and a layer that is there in full leaves nothing to bring out."""
     plan, full = make_plan(brought_out(1.0, rash=0.3)), make_plan(brought_out(1.0, rash=1.0))
-    assert set(plan.maps) == {"grown", "grown_height", "keyed_rash", "keyed_rash_height"}
+    assert set(plan.maps) == {"grown", "grown_slope", "keyed_rash", "keyed_rash_slope"}
     assert re.search(r"keyed_rash\[0\] \* clamp\(blood_packed_others_\d\[\d\], 0.0, 0.7\)", sources(plan)["chromophores"])
     assert axes(plan)["hemoglobin"].high == pytest.approx(axes(full)["hemoglobin"].high)
-    assert set(full.maps) == {"grown", "grown_height"}
+    assert set(full.maps) == {"grown", "grown_slope"}
 
 
 def test_a_layer_that_is_painted_says_how_far_it_goes():
     before = make_plan(brought_out(0.5))
     layer = np.zeros((2, 2, 4), dtype=np.float32)
     layer[0, 0, 0] = 0.8
-    after = reached(before, {"keyed_rash": {1001: layer}, "keyed_rash_height": {1001: np.zeros((2, 2, 1), np.float32)}})
+    after = reached(before, {"keyed_rash": {1001: layer}, "keyed_rash_slope": {1001: np.zeros((2, 2, 3), np.float32)}})
     assert axes(after)["hemoglobin"].high == pytest.approx(default_skin()["hemoglobin"] * math.exp(0.4))
     assert "oxygenation" not in axes(after) and after.maps == before.maps
 
@@ -138,10 +138,10 @@ def test_features_share_maps_and_fragments(monkeypatch):
     text = sources(plan)
     assert text["chromophores"].count("melanin *= exp(grown[1])") == 1
     assert "#define GROWN_LOG_HEMOGLOBIN 1\n" in text["chromophores"]
-    assert "height_mm += grown_height[0]" in text["relief"] and "relief *" not in text["relief"]
-    assert set(plan.maps) == {"anatomy", "grown", "grown_height"}
+    assert "slope += vector(grown_slope)" in text["slopes"] and "relief" not in text
+    assert set(plan.maps) == {"anatomy", "grown", "grown_slope"}
     # Each alone leaves nothing of the other.
-    assert "relief" not in sources(plan.without("bumpy"))
+    assert "slopes" not in sources(plan.without("bumpy"))
     assert "#define GROWN_LOG_HEMOGLOBIN 0\n" in sources(plan.without("bumpy"))["chromophores"]
 
 

@@ -194,3 +194,10 @@ def test_the_number_of_threads_changes_no_bit(face):
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
     )
     assert run.stdout.split() == [hashlib.sha256(part.tobytes()).hexdigest() for part in parts]
+
+
+def test_furrows_are_as_much_steeper_as_their_skin_is_shorter():
+    """But for the first 6 %, which makes no fold."""
+    pattern = wrinkles.steepening(plate(0.7)).max(axis=0)
+    assert pattern == pytest.approx(np.exp(-strain.WRINKLE_FROM_STRAIN) / 0.7, rel=1e-4)
+    assert wrinkles.steepening(plate(1.2)) == pytest.approx(1.0)

@@ -103,7 +103,7 @@ class ShaderInput:
 class Fragment:
     """OSL of one effect: a file of `shaders_osl/effects/`, its inputs, and macros the file uses."""
 
-    stage: str  # "chromophores", "surface" or "relief": the file of `shaders_osl/` it goes into
+    stage: str  # "chromophores", "surface", "relief" or "slopes": the file of `shaders_osl/` it goes into
     file: str
     inputs: tuple[ShaderInput, ...] = ()
     defines: Mapping[str, str] = field(default_factory=dict)

@@ -1,6 +1,7 @@
 """Features that grow on the skin, freckles, moles, vessels and the like: one effect per row of the native core.
 
-All of them share three maps of sums over their layers, each made only when an active feature writes to it. A feature
+All of them share three maps of sums over their layers, each made only when an active feature writes to it; of heights the
+material gets the slopes (domain/slopes.py). A feature
 that a state of the body brings out (`feature` in rigs/blood.toml) has its layer in maps of its own besides, times a
 strength that the object holds and that moves: on top of its own strength, together no more than the whole layer.
 """
@@ -38,7 +39,7 @@ MAPS = {
 _FACTORS = {"log_hemoglobin": "hemoglobin", "log_melanin": "melanin", "log_oil": "oil"}
 _CHANGES = ("oxygenation", "ink_per_mm")
 
-_KEYED, _HEIGHT = "keyed_", "_height"
+_KEYED, _HEIGHT, _SLOPE = "keyed_", "_height", "_slope"
 
 ROWS: dict[str, dict[str, Any]] = {row["id"]: row for row in sanguine_core.features()}
 
@@ -61,15 +62,24 @@ def has_height(scene: Scene) -> bool:
 
 
 def channels_of(name: str) -> tuple[str, ...] | None:
-    """What the channels of a painted map hold; None of any other map."""
+    """What the channels of a painted map, or of the slopes of one, hold; None of any other map."""
+    if height_of(name) is not None:
+        return ("slope_t", "slope_b")
     if name.startswith(_KEYED):
         return MAPS["grown_height" if name.endswith(_HEIGHT) else "grown"]
     return MAPS.get(name)
 
 
 def feature_of(name: str) -> str | None:
-    """The feature that a map holds at full strength, all by itself; None of sums."""
+    """The feature that a painted map holds at full strength, all by itself; None of sums."""
     return name.removeprefix(_KEYED).removesuffix(_HEIGHT) if name.startswith(_KEYED) else None
+
+
+def height_of(name: str) -> str | None:
+    """The painted map whose slopes the material's map `name` holds; None where it holds the painted map itself."""
+    if name.endswith(_SLOPE) and (name.startswith(_KEYED) or name == "grown" + _SLOPE):
+        return name.removesuffix(_SLOPE) + _HEIGHT
+    return None
 
 
 def keyed(scene: Scene) -> dict[str, float]:
@@ -95,7 +105,7 @@ def _maps(scene: Scene, row: dict[str, Any]) -> tuple[str, ...]:
             wanted = []
         names = {"grown": f"{_KEYED}{row['id']}", "grown_height": f"{_KEYED}{row['id']}{_HEIGHT}"}
         wanted += [names[name] for name in names if mine & set(MAPS[name])]
-    return tuple(wanted)
+    return tuple(name.removesuffix(_HEIGHT) + _SLOPE if name.endswith(_HEIGHT) else name for name in wanted)
 
 
 def _fragments(scene: Scene, row: dict[str, Any]) -> tuple[Fragment, ...]:
@@ -121,10 +131,10 @@ def _fragments(scene: Scene, row: dict[str, Any]) -> tuple[Fragment, ...]:
                 ShaderInput("skin_ink_per_mm", "float", "parameter", "ink_per_mm"),
             ),
         ),
-        "grown_height": Fragment(
-            stage="relief",
-            file="grown_height.osl",
-            inputs=(ShaderInput("grown_height", "color", "map", "grown_height"),),
+        "grown_slope": Fragment(
+            stage="slopes",
+            file="grown_slope.osl",
+            inputs=(ShaderInput("grown_slope", "color", "map", "grown_slope"),),
         ),
     }
     own = tuple(made[name] for name in _maps(scene, row) if name in made)
@@ -141,7 +151,7 @@ def _keyed_fragments(scene: Scene) -> tuple[Fragment, ...]:
         read = {
             **{channel: f"{name}[{MAPS['grown'].index(channel)}]" for channel in _FACTORS},
             "oxygenation": f"{name}_oxygenation",
-            "height_mm": f"{name}{_HEIGHT}[0]",
+            "height_mm": f"vector({name}{_SLOPE})",
         }
         mine = [change["channel"] for change in ROWS[feature]["changes"]]
         for channel in mine:
@@ -151,17 +161,17 @@ def _keyed_fragments(scene: Scene) -> tuple[Fragment, ...]:
         if "oxygenation" in mine:
             inputs["grown"].append(ShaderInput(f"{name}_oxygenation", "float", "map:alpha", name))
         if "height_mm" in mine:
-            inputs["grown_height"].append(ShaderInput(f"{name}{_HEIGHT}", "color", "map", f"{name}{_HEIGHT}"))
+            inputs["grown_height"].append(ShaderInput(f"{name}{_SLOPE}", "color", "map", f"{name}{_SLOPE}"))
         for kind in inputs:
             if set(mine) & set(MAPS[kind]):
                 inputs[kind].append(item)
     sums = {f"KEYED_{channel.upper()}": f"({' + '.join(added)})" for channel, added in terms.items()}
-    height = sums.pop("KEYED_HEIGHT_MM", "")
+    slope = sums.pop("KEYED_HEIGHT_MM", "")
     made = []
     if inputs["grown"]:
         made.append(Fragment("chromophores", "keyed.osl", tuple(inputs["grown"]), sums))
-    if height:
-        made.append(Fragment("relief", "keyed_height.osl", tuple(inputs["grown_height"]), {"KEYED_HEIGHT_MM": height}))
+    if slope:
+        made.append(Fragment("slopes", "keyed_slope.osl", tuple(inputs["grown_height"]), {"KEYED_SLOPE": slope}))
     return tuple(made)
 
 

@@ -27,31 +27,32 @@ def moving_activation(scene: Scene, effect_id: str) -> Activation:
     return Activation(True, decision.because, frames)
 
 
-def packed_components(images: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
-    """Properties, but for the half of the face in their names -> the components, four to an image, that their numbers are:
-    the first three of each image, and by threes what the images hold in alpha. An image's own come under its name."""
-    alphas = [4 * i + NUMBERS for i in range(len(images))]
-    kind = images[0].rpartition("_")[0]
-    colors = {image: tuple(range(4 * i, 4 * i + NUMBERS)) for i, image in enumerate(images)}
+def packed_components(driven: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    """Properties, but for the half of the face in their names -> the components, four to each of `driven`, that their
+    numbers are: the first three of each, under its name, and by threes those that are left."""
+    alphas = [4 * i + NUMBERS for i in range(len(driven))]
+    kind = driven[0].rpartition("_")[0]
+    colors = {name: tuple(range(4 * i, 4 * i + NUMBERS)) for i, name in enumerate(driven)}
     return colors | {f"{kind}_alpha_{i // NUMBERS}": tuple(alphas[i : i + NUMBERS]) for i in range(0, len(alphas), NUMBERS)}
 
 
-def component_inputs(images: tuple[str, ...]) -> tuple[ShaderInput, ...]:
-    """Images of components, the properties that drive them in each half of the face, and the place that says which."""
+def component_inputs(driven: tuple[str, ...], images: tuple[str, ...]) -> tuple[ShaderInput, ...]:
+    """Images of components, the properties that drive them in each half of the face (of `packed_components`), and the
+    place that says which."""
     inputs = [ShaderInput("rest_mm", "vector", "vertex", "rest_mm")]
     for image in images:
         inputs.append(ShaderInput(image, "color", "map", image))
         inputs.append(ShaderInput(f"{image}_alpha", "float", "map:alpha", image))
-    names = [f"{name}_{half}" for name in packed_components(images) for half in HALVES]
+    names = [f"{name}_{half}" for name in packed_components(driven) for half in HALVES]
     return (*inputs, *(ShaderInput(name, "color", "object", name) for name in names))
 
 
-def component_sum(images: tuple[str, ...]) -> str:
-    """OSL for the sum of the driven components; `left` is the share of the left half."""
+def component_sum(driven: tuple[str, ...], images: tuple[str, ...]) -> str:
+    """OSL for the sum of the components, four in an image, as they are driven; `left` is the share of the left half."""
     terms = []
-    for name, held in packed_components(images).items():
+    for name, held in packed_components(driven).items():
         alphas = [f"{images[i // 4]}_alpha" for i in held] + ["0.0"] * (NUMBERS - len(held))
-        components = name if name in images else ", ".join(alphas)
+        components = images[driven.index(name)] if name in driven else ", ".join(alphas)
         terms.append(f"dot(vector({components}), vector(mix({name}_right, {name}_left, left)))")
     return "(" + " + ".join(terms) + ")"
 
@@ -60,9 +61,9 @@ def _fragments(_scene: Scene) -> tuple[Fragment, ...]:
     fragment = Fragment(
         stage="chromophores",
         file="strain.osl",
-        inputs=(*component_inputs(IMAGES), ShaderInput("strain", "float", "strength", "strain")),
+        inputs=(*component_inputs(IMAGES, IMAGES), ShaderInput("strain", "float", "strength", "strain")),
         defines={
-            "STRAIN_LOG_AREA": component_sum(IMAGES),
+            "STRAIN_LOG_AREA": component_sum(IMAGES, IMAGES),
             "HALF_BLEND_MM": f"{strain.HALF_BLEND_MM}",
             "STRAIN_STRETCH": f"{strain.STRETCH_PER_LOG_AREA}",
             "STRAIN_POOL": f"{strain.POOL_PER_LOG_AREA}",
