@@ -159,7 +159,7 @@ def truth_against_skin(stored: Any) -> dict[str, Any]:
     return found
 
 
-def measure(quick: bool, reuse: bool) -> dict[str, Any]:
+def measure(quick: bool, reuse: str | None) -> dict[str, Any]:
     import picture_ours as ours
 
     stored = np.load(TRUTH)
@@ -178,7 +178,7 @@ def measure(quick: bool, reuse: bool) -> dict[str, Any]:
         "truth_against_skin": truth_against_skin(stored),
         "grid": [], "alternatives": [], "table": [], "maps": [],
     }
-    pictures = Pictures(reuse)
+    pictures = Pictures(reuse is not None)
     shown: dict[str, np.ndarray] = {}
 
     # Lobes and samples, with the denoiser (as shots are rendered) and without.
@@ -256,7 +256,7 @@ def measure(quick: bool, reuse: bool) -> dict[str, Any]:
 
     results["live table"] = [live_table(step) for step in TABLE_STEPS]
 
-    if reuse:
+    if reuse == "all":
         last = json.loads((RESULTS / "picture.json").read_text(encoding="utf-8"))
         results |= {key: last[key] for key in TIMES}
     else:
@@ -453,7 +453,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="fewer settings; presets and pages are left alone")
     parser.add_argument("--report", action="store_true", help="presets, plots and page from the stored results")
-    parser.add_argument("--reuse", action="store_true", help="our pictures and times from the last run on this machine")
+    parser.add_argument("--reuse", choices=("pictures", "all"), help="our pictures from the last run on this machine, or its times too")
     options = parser.parse_args()
     path = RESULTS / ("picture_quick.json" if options.quick else "picture.json")
     if not options.report:

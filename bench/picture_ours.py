@@ -226,7 +226,7 @@ def take(samples: int, denoise: bool = False) -> Shot:
 
 
 def sample_costs(
-    materials: dict[str, Material], few: int = 4, many: int = 36, pixels: int = 96, repeats: int = 3
+    materials: dict[str, Material], few: int = 4, many: int = 36, pixels: int = 160, repeats: int = 4
 ) -> dict[str, float]:
     """Core seconds per million samples of each material on the sphere, taken in turn, the least of `repeats`.
 
