@@ -149,7 +149,7 @@ def fit_report(
     free: Sequence[str] = (),
     progress: Callable[[int, int], bool] | None = None,
 ) -> dict[str, Any]:
-    """The answer of `sanguine fit`, as `contract.md` lays it out."""
+    """The answer of `sanguine fit`."""
     prior = priors(free)
     included = specular_included(spectra, prior, specular)
     fit = sanguine_core.fit(

@@ -41,7 +41,7 @@ def read_skins(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, 
 
 
 def report(ids: list[str], skins: list[dict[str, float]], wavelengths_nm: np.ndarray) -> dict[str, Any]:
-    """The answer of `sanguine skin`, as `contract.md` lays it out.
+    """The answer of `sanguine skin`.
 
     Everything but `surface_reflectance` is light that went through the skin: what the oil film reflects on
     average, E, is taken from it once, so `reflectance` is (1 - E) of the bare skin's.

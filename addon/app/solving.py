@@ -87,7 +87,7 @@ def answer(
     max_seconds: float,
     progress: Callable[[str, int, int], None],
 ) -> dict[str, Any]:
-    """The answer of `sanguine solve`, as `contract.md` lays it out.
+    """The answer of `sanguine solve`.
 
     `radii_mm` holds for the cases without radii of their own; None is DEFAULT_RADII_MM, an empty list totals alone.
     A case that cannot be solved has `error` set and no numbers, and the others are still answered.
