@@ -1,5 +1,6 @@
-import re
 """Thin parts: the walk lets through what the skin's own layers do, and costs nothing where it does not run."""
+
+import re
 
 import numpy as np
 import pytest
@@ -34,9 +35,9 @@ def test_what_is_off_is_in_neither_table_nor_shader():
     assert not off.decisions["thin"].active and on.decisions["thin"].active
     assert not re.search(r"walk|\bthin\b|sanguine_thin", assemble(off)["surface"].source)
     assert "random_walk_skin" in assemble(on)["surface"].source
-    assert assemble(off)["chromophores"].source.replace(str(float(layout((), LOBES).shape[1])), "") == assemble(on)[
+    assert assemble(off)["chromophores"].source.replace(str(float(layout((), off.settings.lobes).shape[1])), "") == assemble(on)[
         "chromophores"
-    ].source.replace(str(float(layout((), LOBES, True).shape[1])), "")
+    ].source.replace(str(float(layout((), on.settings.lobes, True).shape[1])), "")
     assert quantity_count(LOBES, False) == len(lobe_sockets()) == 8
     assert quantity_count(LOBES, True) == len(lobe_sockets(walk=True)) == 10
 
