@@ -52,6 +52,7 @@ BAR = 0.7
 
 STOCK, STOCK_MAPS = "Principled, one colour", "Principled, its maps"
 SANGUINE = {OSL: "Sanguine, OSL", NODES: "Sanguine, plain nodes"}
+SAME = "Principled, a map for each emotion, our relief"
 FLOOR = "One Burley lobe and a gloss, one colour"
 BLOOD = "Sanguine, plain nodes, what every skin has"
 PAINTED = "Sanguine, plain nodes, all but Relief's noise and diffuse relief"
@@ -66,7 +67,6 @@ class Stage:
     def __init__(self, shot: Shot, plan: Plan) -> None:
         self.renderer = BlenderRenderer()
         self.renderer.prepare(shot, shot.subjects[0], plan, {})
-        job = next(job for job in jobs(shot) if job.id == POSE)
         scene = bpy.context.scene
         self.size(PIXELS)
         scene.render.threads_mode, scene.render.threads = "FIXED", 1
@@ -74,9 +74,14 @@ class Stage:
         scene.cycles.use_denoising = False
         self.face = next(obj for obj in bpy.data.objects if obj.type == "MESH" and any(MARK in m for m in obj.data.materials if m))
         self.rig = self.face.parent
-        wanted, bone = pose_of(shot, job).controls, self.rig.pose.bones[CONTROL_BONE]
-        set_controls(self.rig, {name: wanted.get(name, 0.0) for name in CONTROLS if name in bone})
+        self.shot = shot
+        self.pose(POSE)
         self.materials: dict[str, tuple[bpy.types.Material, bool]] = {}
+
+    def pose(self, expression: str) -> None:
+        job = next(job for job in jobs(self.shot) if job.id == expression)
+        wanted, bone = pose_of(self.shot, job).controls, self.rig.pose.bones[CONTROL_BONE]
+        set_controls(self.rig, {name: wanted.get(name, 0.0) for name in CONTROLS if name in bone})
 
     @staticmethod
     def size(pixels: tuple[int, int]) -> None:
@@ -181,6 +186,49 @@ def artists_skin(stage: Stage, skin: dict[str, float], plan: Plan) -> bpy.types.
     return material
 
 
+def same_content_skin(stage: Stage, skin: dict[str, float]) -> bpy.types.Material:
+    """What Principled takes to show what the whole skin shows: a map of the colours of each emotion, mixed by properties of
+    the face as far as the emotions are on, and the same relief, wrinkles that form too."""
+    images = {}
+    for job in jobs(stage.shot):
+        stage.pose(job.id)
+        images[job.id] = baked_colour(stage)
+    stage.pose(POSE)
+    material = stage.materials[SANGUINE[NODES]][0].copy()
+    node = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeGroup")
+    tree = node.node_tree = node.node_tree.copy()
+    normal = next(
+        link.from_socket for link in tree.links if link.to_socket.name == "Normal" and link.to_node.bl_idname == "ShaderNodeGroup"
+    )
+    stock = next(node for node in stock_skin(skin).node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    shader.subsurface_method = stock.subsurface_method
+    for socket in stock.inputs:
+        if not socket.is_linked and socket.name in shader.inputs and hasattr(socket, "default_value"):
+            shader.inputs[socket.name].default_value = socket.default_value
+    colour, attribute = None, None
+    for i, image in enumerate([images.pop("neutral"), *images.values()]):
+        texture = tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image
+        if colour is None:
+            colour = texture.outputs["Color"]
+            continue
+        if i % 3 == 1:  # three numbers a property, as ours
+            attribute, parts = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeSeparateXYZ")
+            attribute.attribute_type, attribute.attribute_name = "OBJECT", f"emotions_{i // 3}"
+            stage.face[attribute.attribute_name] = [float(name == POSE) for name in [*images][i - 1 : i + 2]]
+            tree.links.new(attribute.outputs["Vector"], parts.inputs[0])
+        mix = tree.nodes.new("ShaderNodeMixRGB")
+        tree.links.new(parts.outputs[(i - 1) % 3], mix.inputs["Fac"])
+        tree.links.new(colour, mix.inputs["Color1"])
+        tree.links.new(texture.outputs["Color"], mix.inputs["Color2"])
+        colour = mix.outputs["Color"]
+    tree.links.new(colour, shader.inputs["Base Color"])
+    tree.links.new(normal, shader.inputs["Normal"])
+    tree.links.new(shader.outputs["BSDF"], next(node for node in tree.nodes if node.bl_idname == "NodeGroupOutput").inputs["BSDF"])
+    return material
+
+
 def baked_colour(stage: Stage, size: int = 1024) -> bpy.types.Image:
     """Our skin's colour as a map: the sum of its lobes' weights, baked by Cycles."""
     material = stage.materials[SANGUINE[NODES]][0].copy()
@@ -239,7 +287,8 @@ def verdict(results: dict[str, Any]) -> str:
     return (
         f"and **the whole skin does not meet it** ({whole:.2f}); {', '.join(within) or 'none of its parts'} "
         f"{'do' if len(within) > 1 else 'does'}. {FLOOR} takes {alone[FLOOR] / alone[STOCK_MAPS]:.2f}, so that Cycles leaves "
-        f"{max(0.0, BAR - alone[FLOOR] / alone[STOCK_MAPS]):.2f} for all that is in a skin."
+        f"{max(0.0, BAR - alone[FLOOR] / alone[STOCK_MAPS]):.2f} for all that is in a skin. Beside a Principled that shows the "
+        f"same ({SAME}) the whole skin takes {alone[SANGUINE[NODES]] / alone[SAME]:.2f}."
     )
 
 
@@ -267,7 +316,7 @@ Written by `bench/cost.py`; not for editing by hand. Blender {results["blender"]
 
 The head of `examples/five_expressions.toml` with all its maps, in anger, {PIXELS[0]} x {PIXELS[1]} pixels, quality *final* ({quality["lobes"]} lobes, table step {quality["table_step"]:g}). Seconds of the processor for {SAMPLES} samples more than {FEW}: what comes before the first sample is taken off. Every material is rendered in turn, {results["rounds"]} rounds, and the least counts, so that the machine's other work disturbs all alike.
 
-**Principled, one colour** is a Principled BSDF with random walk in the skin's colour, nothing else. **Principled, its maps** is what an artist makes of it: the same skin's colours as a baked map, pores as a bump. **{FLOOR}** is the least that a skin of ours could take. **What every skin has** is ours without features, strain and relief; the whole has all that the shot asks for, which Principled cannot show: blood by region and by strain, wrinkles that form, fine lines.
+**Principled, one colour** is a Principled BSDF with random walk in the skin's colour, nothing else. **Principled, its maps** is what an artist makes of it: the same skin's colours as a baked map, pores as a bump. **{SAME}** shows what our whole skin shows: colours baked for each of the five expressions and mixed by properties of the face, and the relief of our own nodes. **{FLOOR}** is the least that a skin of ours could take. **What every skin has** is ours without features, strain and relief; the whole has all that the shot asks for: blood by region and by strain, wrinkles that form, fine lines.
 
 The bar is {BAR} of Principled with its maps, {verdict(results)}
 
@@ -311,8 +360,9 @@ def main() -> None:
     skin = skin_from(subject.skin, "skin")
     stage.add(STOCK, stock_skin(skin), False)
     stage.add(STOCK_MAPS, artists_skin(stage, skin, plan), False)
+    stage.add(SAME, same_content_skin(stage, skin), False)
     stage.add(FLOOR, floor_skin(skin), False)
-    names = [STOCK, STOCK_MAPS, FLOOR, BLOOD, PAINTED, SMOOTH, SANGUINE[NODES], SANGUINE[OSL]]
+    names = [STOCK, STOCK_MAPS, SAME, FLOOR, BLOOD, PAINTED, SMOOTH, SANGUINE[NODES], SANGUINE[OSL]]
     results: dict[str, Any] = {
         "machine": platform.machine(), "blender": bpy.app.version_string, "rounds": options.rounds,
         "quality": plan.settings.model_dump(), "seconds": {}, "noise": {}, "effects": {},
