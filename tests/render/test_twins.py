@@ -114,6 +114,8 @@ def ball(shading, plan, table, melanin):
     maps = {key: numbers.uniform(0.0, 0.4, (6, 6, 4)).astype(np.float32) for key in plan.maps}
     maps["anatomy"] += (0.8, 0.8, 0.8, -0.2)
     maps["residual"] += 0.7
+    for name in [name for name in maps if "_slope" in name]:
+        maps[name] -= 0.2  # up and down, as relief is: sums of them tilt by some tens of degrees
     inputs = {item.key for fragment in plan.fragments for item in fragment.inputs if item.source == "object"}
     for name in inputs:
         skin[name] = [0.3, 0.2, 0.1] if name.startswith(("strain_", "wrinkles_")) else [0.01, 0.005, 0.002]
