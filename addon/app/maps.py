@@ -109,6 +109,7 @@ class Grown:
         self.surface, self.growth, self.size, self.cache, self.progress = surface, growth, size, cache, progress
         self.key = key_of(surface.digest, asdict(growth), size, _PADDING)
         self._layers: dict[str, np.ndarray] = {}  # a feature may write to several maps
+        self._furrows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of the last image: both axes want them
 
     @cached_property
     def texel(self) -> np.ndarray:
@@ -131,6 +132,25 @@ class Grown:
         if self.size <= LARGEST_WRINKLES:
             return self
         return Grown(self.surface, self.growth, LARGEST_WRINKLES, self.cache)
+
+    def furrows(self, image: int) -> tuple[np.ndarray, np.ndarray]:
+        """Heights in mm of four fold patterns and how many times steeper each gets, (size, size, 4); beyond the edge of a UV
+        island those of the skin there, for the slopes at the edge."""
+        if image not in self._furrows:
+            face, shown = self.surface, self.places
+            vertex, share = face.corner_vertex[face.triangles[shown.triangle]], np.asarray(shown.barycentric)
+            fields = (*face.furrows, wrinkles.steepening(face.moving))
+            heights, steeper = (np.zeros((self.size * self.size, 4), dtype=np.float32) for _ in range(2))
+            for i in range(4):
+                depth, phase, factor = ((field[4 * image + i][vertex] * share).sum(axis=1) for field in fields)
+                at = depth > 0.0
+                heights[shown.texel[at], i] = wrinkles.furrow_height_mm(
+                    depth[at], phase[at], shown.place_mm[at], seed=4 * image + i
+                )
+                steeper[shown.texel, i] = factor
+            form = (self.size, self.size, 4)
+            self._furrows = {image: (heights.reshape(form), steeper.reshape(form))}
+        return self._furrows[image]
 
     def layer(self, feature: str, progress: Progress | None = None) -> np.ndarray:
         """(N, C) float16, channels in the order of the feature's row. Half is what the material's maps hold too."""
@@ -247,14 +267,12 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
     if name == anatomy.MAP:
         rest = {region: asdict(ANATOMY[region]) for region in face.regions if region in ANATOMY}
         return cache.get(key_of(face.digest, name, size, _PADDING, rest), lambda: _anatomy(face, size))
-    if name in grown.MAPS:
-        strengths = {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
-        return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, grown.MAPS[name]))
     if (height := grown.height_of(name)) is not None:
-        heights = _bake(height, plan, layers, size)
-        return cache.get(key_of(layers.key, name, heights), lambda: _slopes(layers, heights))
-    if (feature := grown.feature_of(name)) is not None:
-        return cache.get(key_of(layers.key, name), lambda: layers.compose({feature: 1.0}, grown.channels_of(name)))
+        key = key_of(layers.key, name, _strengths(height, plan))
+        return cache.get(key, lambda: _slopes(layers, _bake(height, plan, layers, size)))
+    if (channels := grown.channels_of(name)) is not None:
+        strengths = _strengths(name, plan)
+        return cache.get(key_of(layers.key, name, strengths), lambda: layers.compose(strengths, channels))
     if name in strain_effect.IMAGES:
         key = key_of(face.motion_digest, name, size, _PADDING)
         return cache.get(key, lambda: _strain(face, size, strain_effect.IMAGES.index(name)))
@@ -264,6 +282,13 @@ def _bake(name: str, plan: Plan, layers: Grown, size: int) -> np.ndarray | None:
         key = key_of(face.motion_digest, name, layers.size, _PADDING)
         return cache.get(key, lambda: _wrinkles(layers, wrinkles_effect.SLOPES[axis].index(name), axis))
     return None
+
+
+def _strengths(name: str, plan: Plan) -> dict[str, float]:
+    """How strong each feature is in a painted map."""
+    if (feature := grown.feature_of(name)) is not None:
+        return {feature: 1.0}
+    return {row["id"]: plan.scene.strengths.get(row["id"], 0.0) for row in sanguine_core.features()}
 
 
 def strain_coefficients(face: Surface, cache: MapCache | None = None) -> np.ndarray:
@@ -290,20 +315,9 @@ def _slopes(layers: Grown, height_mm: np.ndarray) -> np.ndarray:
 
 
 def _wrinkles(layers: Grown, image: int, axis: int) -> np.ndarray:
-    """Slopes of four fold patterns along the tangent (axis 0) or the bitangent (1), (size, size, 4). Beyond the edge of a UV
-    island the heights are those of the skin there, for the slopes at the edge."""
-    face, shown = layers.surface, layers.places
-    vertex, share = face.corner_vertex[face.triangles[shown.triangle]], np.asarray(shown.barycentric)
-    fields = (*face.furrows, wrinkles.steepening(face.moving))
-    slopes = np.zeros((layers.size * layers.size, 4), dtype=np.float32)
-    for i in range(4):
-        depth, phase, steeper = ((field[4 * image + i][vertex] * share).sum(axis=1) for field in fields)
-        at = depth > 0.0
-        height = np.zeros(layers.size * layers.size, dtype=np.float32)
-        height[shown.texel[at]] = wrinkles.furrow_height_mm(depth[at], phase[at], shown.place_mm[at], seed=4 * image + i)
-        slope = layers.axes.slopes(height.reshape(layers.size, layers.size, 1), axis)
-        slopes[shown.texel, i] = steeper * slope.ravel()[shown.texel]
-    return slopes.reshape(layers.size, layers.size, 4)
+    """Slopes of four fold patterns along the tangent (axis 0) or the bitangent (1), (size, size, 4)."""
+    heights, steeper = layers.furrows(image)
+    return steeper * layers.axes.slopes(heights, axis)
 
 
 def _masks(face: Surface, size: int, regions: tuple[str, ...]) -> np.ndarray:

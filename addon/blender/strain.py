@@ -1,8 +1,8 @@
 """Drivers from shape keys to the components of strain and wrinkles: custom properties that the material reads.
 
-Each property holds three numbers, components of one image in one half of the face, or of the alphas of several. The drivers are simple
-expressions that listen to the keys' values, whatever moves these (keyframes, drivers, capture), so a file with them
-works without the add-on and with auto-run off.
+Each property holds three numbers, components of one image in one half of the face, or of the alphas of several. The
+drivers are simple expressions that listen to the keys' values, whatever moves these (keyframes, drivers, capture), so a
+file with them works without the add-on and with auto-run off.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ EFFECT = Effect(
     id="diffuse_relief",
     label="Diffuse relief",
     help="Pores, furrows and wrinkles shade the light from under the skin too, not its highlights alone. Costs time: "
-    "Cycles then runs the whole material a second time where light leaves the skin.",
+    "Cycles then runs what bends the surface a second time where light leaves the skin, and all of a material of OSL.",
     reads=(),
     writes=(),
     activate=_activate,

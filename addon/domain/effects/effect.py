@@ -86,8 +86,9 @@ class ShaderInput:
     """One input of the assembled shader and where its value comes from.
 
     source: "parameter" (a schema id, a slider of the node group), "strength" (the effect's own slider),
-    "object" (a custom property of the object, of three numbers), "vertex" (an attribute of the mesh, "vertex:weight" a single number of it), "map" (a packed image,
-    "map:alpha" its alpha channel), "chromophores" (an output of the first shader, for inputs of the second).
+    "object" (a custom property of the object, of three numbers), "vertex" (an attribute of the mesh, "vertex:weight" a
+    single number of it), "map" (a packed image, "map:alpha" its alpha channel), "chromophores" (an output of the first
+    shader, for inputs of the second).
     """
 
     name: str
